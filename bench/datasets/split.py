@@ -148,6 +148,7 @@ def leak(takes: Sequence[Take], split: Split) -> Leak:
 
 
 def _pose_summary(take: Take) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    positions, _ = window_frame(take.clip)
+    clip = take.clip
+    positions, _ = window_frame(clip.rotations_wxyz, clip.root_xyz_m, clip.skeleton)
     flat = positions.reshape(len(positions), -1)
     return np.concatenate([flat.mean(axis=0), flat.std(axis=0)])

@@ -61,7 +61,7 @@ def window(clip: Clip, start: int, n_frames: int) -> Clip:
 
 
 def window_starts(n_frames: int, length: int, stride: int) -> tuple[int, ...]:
-    """Starts of the windows of a clip of ``n_frames``: every ``stride`` frames, the tail dropped; one if it is short."""
+    """Starts of the windows of a clip: every ``stride`` frames, the tail dropped; a short clip has one, at 0."""
     return tuple(range(0, max(n_frames - length, 0) + 1, stride))
 
 

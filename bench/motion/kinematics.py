@@ -112,8 +112,15 @@ def foot_contacts(
 def yaw_aligned(
     rotations_wxyz: FloatArray, root_xyz_m: FloatArray, yaw_rad: FloatArray | float
 ) -> tuple[FloatArray, FloatArray]:
-    """Turn a motion by ``-yaw_rad`` about the world up axis: root rotation ``[T, J, 4]`` and path ``[T, 3]``."""
-    turn = quat.about_y(-np.asarray(yaw_rad, dtype=np.float64))
+    """Turn motions by ``-yaw_rad`` about the world up axis.
+
+    Parameters
+    ----------
+    rotations_wxyz : ``[..., T, J, 4]`` local rotations; only joint 0 changes.
+    root_xyz_m : ``[..., T, 3]``.
+    yaw_rad : broadcast against ``[..., T]``.
+    """
+    turn = np.broadcast_to(quat.about_y(-np.asarray(yaw_rad, dtype=np.float64)), (*root_xyz_m.shape[:-1], 4))
     rotations = rotations_wxyz.copy()
-    rotations[:, 0] = quat.multiply(np.broadcast_to(turn, rotations[:, 0].shape), rotations_wxyz[:, 0])
-    return rotations, quat.rotate(np.broadcast_to(turn, (*root_xyz_m.shape[:-1], 4)), root_xyz_m)
+    rotations[..., 0, :] = quat.multiply(turn, rotations_wxyz[..., 0, :])
+    return rotations, quat.rotate(turn, root_xyz_m)

@@ -1,8 +1,9 @@
 """Clips as feature arrays with named slices, and back.
 
-Two frames of reference occur. *Window frame*: the root's ground position is removed frame by frame, but the heading only
-once, as the mean facing of the whole window, so that turns stay visible; judges read this. *Local frame*: ground position
-and heading are both removed frame by frame; the papers' generators read this, with the removed path in a ``RootTrack``.
+Two frames of reference occur. *Window frame*: the root's ground position is removed frame by frame, but the heading
+only once, as the mean facing of the whole window, so that turns stay visible; judges read this. *Local frame*: ground
+position and heading are both removed frame by frame; the papers' generators read this, with the removed path in a
+``RootTrack``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from bench.arrays import FloatArray, finite_array
 from bench.errors import BadMotion
 from bench.motion import quat
 from bench.motion.clip import Clip
-from bench.motion.kinematics import facing_yaw, floor_height, forward_kinematics, world_positions, yaw_aligned
+from bench.motion.kinematics import FOOT_JOINTS, facing_yaw, forward_kinematics, world_positions, yaw_aligned
 from bench.motion.skeleton import Skeleton
 
 PARK_SLICES = {"rotation_wxyz": slice(0, 4), "position_m": slice(4, 7)}
@@ -36,30 +37,47 @@ class RootTrack:
     xz_m: FloatArray
 
 
-def mean_facing(positions_m: FloatArray) -> float:
-    """Circular mean of the facing direction over ``[T, 21, 3]``, radians."""
+def mean_facing(positions_m: FloatArray) -> FloatArray:
+    """Circular mean over time of the facing direction, ``[..., T, 21, 3] -> [...]`` radians."""
     yaw = facing_yaw(positions_m)
-    return float(np.arctan2(np.sin(yaw).mean(), np.cos(yaw).mean()))
+    return np.asarray(np.arctan2(np.sin(yaw).mean(axis=-1), np.cos(yaw).mean(axis=-1)))
 
 
-def window_frame(clip: Clip) -> tuple[FloatArray, FloatArray]:
-    """Positions ``[T, 21, 3]`` in statures and local rotations ``[T, 21, 4]`` of a clip in its window frame.
+def window_frame(
+    rotations_wxyz: FloatArray, root_xyz_m: FloatArray, skeleton: Skeleton
+) -> tuple[FloatArray, FloatArray]:
+    """Positions ``[..., T, 21, 3]`` in statures and local rotations ``[..., T, 21, 4]`` in the window frame.
 
-    Heights are over the clip's own floor (its lowest foot or toe point).
+    Heights are over the window's own floor (its lowest foot or toe point).
+
+    Parameters
+    ----------
+    rotations_wxyz : ``[..., T, 21, 4]``, windows of one skeleton.
+    root_xyz_m : ``[..., T, 3]``.
+    skeleton : canonical.
     """
-    if not clip.skeleton.is_canonical:
+    if not skeleton.is_canonical:
         raise BadMotion("window features are defined on the canonical 21 joints", remedy="retarget the clip first")
-    positions = world_positions(clip)
-    rotations, root = yaw_aligned(clip.rotations_wxyz, clip.root_xyz_m, mean_facing(positions))
-    on_ground = np.stack([np.zeros(len(root)), root[:, 1] - floor_height(positions), np.zeros(len(root))], axis=-1)
-    local = forward_kinematics(rotations, on_ground, clip.skeleton)[0]
-    return local / clip.skeleton.stature_m, rotations
+    positions, _ = forward_kinematics(rotations_wxyz, root_xyz_m, skeleton)
+    floor = positions[..., FOOT_JOINTS, 1].min(axis=(-1, -2))
+    rotations, root = yaw_aligned(rotations_wxyz, root_xyz_m, mean_facing(positions)[..., None])
+    root = root * np.array([0.0, 1.0, 0.0])
+    root[..., 1] -= floor[..., None]
+    local, _ = forward_kinematics(rotations, root, skeleton)
+    return local / skeleton.stature_m, rotations
 
 
 def judge_features(clip: Clip) -> FloatArray:
-    """What a judge reads of a window: ``[T, 21, 7]``, slices in ``JUDGE_SLICES``. Signs of rotations are the judge's."""
-    positions, rotations = window_frame(clip)
-    return np.concatenate([positions, rotations], axis=-1)
+    """What a judge reads of a window: ``[T, 21, 7]``, slices in ``JUDGE_SLICES``.
+
+    The signs of the rotations are as in the clip; each judge flips them to its own reference.
+    """
+    return np.concatenate(window_frame(clip.rotations_wxyz, clip.root_xyz_m, clip.skeleton), axis=-1)
+
+
+def yaw_aligned_quaternions(clip: Clip) -> FloatArray:
+    """Local rotations ``[T, 21, 4]`` with the root in the window frame: what the auto-encoder reads."""
+    return window_frame(clip.rotations_wxyz, clip.root_xyz_m, clip.skeleton)[1]
 
 
 def local_frame(clip: Clip) -> tuple[FloatArray, FloatArray, RootTrack]:
