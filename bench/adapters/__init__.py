@@ -1,0 +1,42 @@
+"""Adapters: the thin objects through which the suite talks to methods. ADAPTERS is the table of those that ship."""
+
+from __future__ import annotations
+
+from bench.adapters.anchors import (
+    CoinFlip,
+    ConcatenatedHalves,
+    CopyContent,
+    CopyStyle,
+    FrozenFrame,
+    NoiseHigh,
+    NoiseLow,
+    NoiseMiddle,
+    PoseAdain,
+)
+from bench.adapters.base import Adapter
+from bench.adapters.fitted_anchors import ClassifyAndRetrieve, MeanPose, NearestPose, StyleMeanShift
+from bench.adapters.oracles import LabelOracle, ProceduralTruth, RealDisjoint, RealTest
+
+ADAPTERS: dict[str, type[Adapter]] = {
+    adapter.name: adapter
+    for adapter in (
+        RealTest,
+        RealDisjoint,
+        LabelOracle,
+        ProceduralTruth,
+        CopyContent,
+        CopyStyle,
+        CoinFlip,
+        ConcatenatedHalves,
+        MeanPose,
+        FrozenFrame,
+        NoiseLow,
+        NoiseMiddle,
+        NoiseHigh,
+        StyleMeanShift,
+        PoseAdain,
+        NearestPose,
+        ClassifyAndRetrieve,
+    )
+}
+"""Name -> adapter class. The order is the order of rows that tie."""

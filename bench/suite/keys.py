@@ -1,0 +1,95 @@
+"""What decides a number, as digests: one key a stage, each the blake2b of canonical JSON."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import inspect
+from functools import cache
+from pathlib import Path
+
+from bench.adapters.base import Adapter
+from reports.records import digest_of
+
+OWN_PACKAGES = ("bench", "classifiers", "reports")
+
+
+def adapter_digest(adapter: type[Adapter]) -> str:
+    """Digest of an adapter: its file and every file of this project that the file imports, directly or not."""
+    source = Path(inspect.getfile(adapter)).resolve()
+    return digest_of({"class": adapter.__qualname__, "files": _content_digests(source)})
+
+
+def _content_digests(start: Path) -> list[str]:
+    seen: set[Path] = set()
+    waiting = [start]
+    while waiting:
+        path = waiting.pop()
+        if path not in seen:
+            seen.add(path)
+            waiting.extend(_own_imports(path))
+    return sorted(_file_digest(path) for path in seen)
+
+
+@cache
+def _file_digest(path: Path) -> str:
+    return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
+
+
+@cache
+def _own_imports(path: Path) -> tuple[Path, ...]:
+    """Files of this project named in import statements anywhere in ``path``, and files beside a user's adapter."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+    own = {name for name in names if name.split(".")[0] in OWN_PACKAGES}
+    beside = {path.parent / f"{name.split('.')[0]}.py" for name in names - own}
+    return tuple(
+        sorted({file for file in map(_module_file, own) if file} | {file for file in beside if file.is_file()})
+    )
+
+
+@cache
+def _module_file(name: str) -> Path | None:
+    try:
+        spec = importlib.util.find_spec(name)
+    except ModuleNotFoundError:
+        return None
+    return Path(spec.origin).resolve() if spec and spec.origin and spec.origin.endswith(".py") else None
+
+
+def fit_key(adapter: str, fit_part: str, budget: str, seed: int, device: str) -> str:
+    """Key of a trained method."""
+    return digest_of(
+        {"stage": "fit", "adapter": adapter, "fit": fit_part, "budget": budget, "seed": seed, "device": device}
+    )
+
+
+def generate_key(fit: str, tasks: str, seed: int) -> str:
+    """Key of a set of generated motions; ``fit`` is the fit key, or the adapter digest where nothing is trained."""
+    return digest_of({"stage": "generate", "fit": fit, "tasks": tasks, "seed": seed})
+
+
+def embed_key(motions: str, judges: str) -> str:
+    """Key of what the judges say about a set of motions."""
+    return digest_of({"stage": "embed", "motions": motions, "judges": judges})
+
+
+def score_key(motions: str, judges: str, real_part: str, tasks: str, metric: str, version: int) -> str:
+    """Key of one metric of a set of motions."""
+    return digest_of(
+        {
+            "stage": "score",
+            "motions": motions,
+            "judges": judges,
+            "real": real_part,
+            "tasks": tasks,
+            "metric": metric,
+            "version": version,
+        }
+    )

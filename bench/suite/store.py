@@ -1,0 +1,86 @@
+"""The store: results of stages under content keys, one folder each, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bench.errors import BadConfig
+
+DONE_FILE = "done.json"
+
+
+class Store:
+    """A folder of finished stage results: ``<root>/<stage>/<key>/``.
+
+    A result becomes visible by one rename, so a killed writer leaves at most a folder under ``tmp``, which the next
+    :meth:`sweep` removes. Two writers of one key write equal content; the first to finish wins.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        try:
+            (root / "tmp").mkdir(parents=True, exist_ok=True)
+            if not os.access(root / "tmp", os.W_OK):
+                raise PermissionError(13, "Permission denied")
+        except OSError as error:
+            raise BadConfig(
+                f"the store folder cannot be written: {error.strerror}",
+                where=str(root),
+                remedy="choose a writable folder with --store",
+            ) from error
+
+    def folder(self, stage: str, key: str) -> Path:
+        """Where a result lies or would lie."""
+        return self.root / stage / key
+
+    def has(self, stage: str, key: str) -> bool:
+        return (self.folder(stage, key) / DONE_FILE).is_file()
+
+    def facts(self, stage: str, key: str) -> dict[str, Any]:
+        """The JSON facts stored with a result."""
+        facts: dict[str, Any] = json.loads((self.folder(stage, key) / DONE_FILE).read_text())
+        return facts
+
+    def put(self, stage: str, key: str, write: Callable[[Path], dict[str, Any]]) -> Path:
+        """Store a result: ``write(folder)`` fills an empty folder and returns the facts about it."""
+        draft = self.root / "tmp" / f"{stage}-{os.getpid()}-{uuid.uuid4().hex}"
+        draft.mkdir()
+        try:
+            facts = write(draft)
+            (draft / DONE_FILE).write_text(json.dumps(facts, sort_keys=True))
+            self._flush(draft)
+            final = self.folder(stage, key)
+            final.parent.mkdir(parents=True, exist_ok=True)
+            if not self.has(stage, key):
+                shutil.rmtree(final, ignore_errors=True)
+                try:
+                    draft.rename(final)
+                except OSError:
+                    if not self.has(stage, key):
+                        raise
+            return final
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+
+    def sweep(self) -> None:
+        """Remove drafts of processes that no longer live."""
+        for draft in (self.root / "tmp").iterdir():
+            owner = draft.name.split("-")[-2] if draft.name.count("-") >= 2 else ""
+            if not (owner.isdigit() and Path(f"/proc/{owner}").exists()):
+                shutil.rmtree(draft, ignore_errors=True)
+
+    @staticmethod
+    def _flush(folder: Path) -> None:
+        for path in folder.rglob("*"):
+            if path.is_file():
+                handle = os.open(path, os.O_RDONLY)
+                try:
+                    os.fsync(handle)
+                finally:
+                    os.close(handle)
