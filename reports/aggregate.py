@@ -1,0 +1,241 @@
+"""Numbers of rows from records and samples files: estimates, paired differences, ranks with ties, variance split."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.bootstrap import interval
+from reports.records import BadRecord, Better, Measurement
+from reports.rows import Row, StoredRecord, check_comparable, groups, load_run, rows_of
+from reports.significance import Difference, holm, leader_ranks, mean_and_sd, pareto_front, replicate_difference
+
+__all__ = [
+    "Estimate",
+    "Row",
+    "StoredRecord",
+    "VarianceSplit",
+    "badness",
+    "check_comparable",
+    "estimate",
+    "front",
+    "groups",
+    "holm",
+    "load_run",
+    "mean_replicates_of",
+    "paired_difference",
+    "ranked_order",
+    "rows_of",
+    "sorted_rows",
+    "tie_groups",
+    "variance_split",
+]
+
+SIGNIFICANCE = 0.05
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One number of one row: the mean over the row's seeds and trials."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    n: int
+    unit: str
+    better: Better
+    floor: float | None
+    seeds: int
+    """how many records the mean is taken over"""
+    seed_sd: float | None
+    """standard deviation between those records; None for a single one"""
+    judge_sd: float | None
+    """standard deviation between judge seeds, averaged over the records"""
+    reason: str | None
+    """why the value is undefined, or a warning that belongs beside it"""
+
+
+@dataclass(frozen=True)
+class VarianceSplit:
+    """Standard deviations that one number would show if only that one source were drawn again; None if unknown."""
+
+    judge_seed: float | None
+    method_seed: float | None
+    task_sampling: float | None
+
+
+def estimate(row: Row, metric: str, slice_name: str) -> Estimate | None:
+    """Mean over the row's records with its interval, or None if no record has the measurement.
+
+    The interval says how far the number would move on other tasks with the same trained weights. With several seeds
+    it comes from the replicates averaged over seeds; ``seed_sd`` stands beside it and is not part of it.
+    """
+    found = row.measurements(metric, slice_name)
+    if not found:
+        return None
+    known = [measurement for measurement in found if measurement.value is not None]
+    values = [measurement.value for measurement in known if measurement.value is not None]
+    value, seed_sd = mean_and_sd(values) if values else (None, None)
+    low, high = _interval(row, known, metric, slice_name, value)
+    floors = [measurement.floor for measurement in found if measurement.floor is not None]
+    reasons = [measurement.reason for measurement in found if measurement.reason]
+    return Estimate(
+        value=value,
+        low=low,
+        high=high,
+        n=min(measurement.n for measurement in (known or found)),
+        unit=found[0].unit,
+        better=found[0].better,
+        floor=float(np.mean(floors)) if floors else None,
+        seeds=len(values),
+        seed_sd=seed_sd,
+        judge_sd=_judge_sd(known),
+        reason=reasons[0] if reasons else None,
+    )
+
+
+def _interval(
+    row: Row, known: Sequence[Measurement], metric: str, slice_name: str, value: float | None
+) -> tuple[float | None, float | None]:
+    if value is None:
+        return None, None
+    if len(known) == 1:
+        return known[0].low, known[0].high
+    replicates = mean_replicates_of(row, metric, slice_name)
+    if replicates is None:
+        return None, None
+    low, high = interval(value, replicates)
+    return (low, high) if np.isfinite(low) else (None, None)
+
+
+def _judge_sd(known: Sequence[Measurement]) -> float | None:
+    spreads = [mean_and_sd(measurement.judge_values)[1] for measurement in known if measurement.judge_values]
+    defined = [spread for spread in spreads if spread is not None]
+    return float(np.sqrt(np.mean(np.square(defined)))) if defined else None
+
+
+def mean_replicates_of(row: Row, metric: str, slice_name: str) -> NDArray[np.float64] | None:
+    """Replicates ``[B]`` of a metric averaged over the row's records, or None if a record has none.
+
+    Raises
+    ------
+    BadRecord : replicates of one row differ in number, or are shares where the record says percent.
+    """
+    name = f"replicates/{metric}|{slice_name}"
+    if len(row.samples) < len(row.ok) or any(name not in samples for samples in row.samples):
+        return None
+    stacks = [np.asarray(samples[name], dtype=np.float64) for samples in row.samples]
+    if len({stack.shape for stack in stacks}) != 1 or stacks[0].ndim != 1:
+        raise BadRecord(f"{row.method.name}: {name} must be [B] in every samples file, got {[s.shape for s in stacks]}")
+    mean = np.asarray(np.mean(stacks, axis=0), dtype=np.float64)
+    for measurement in row.measurements(metric, slice_name):
+        if measurement.unit == "%" and (measurement.value or 0.0) > 5.0 and float(np.nanmax(mean)) <= 1.0:
+            raise BadRecord(f"{row.method.name}: {name} are shares up to 1, but the record's value is in percent")
+    return mean
+
+
+def paired_difference(row_a: Row, row_b: Row, metric: str, slice_name: str) -> Difference | None:
+    """A minus B on the same samples (each averaged over its seeds), or None where either has no value or replicates.
+
+    Raises
+    ------
+    BadRecord : the two rows were not scored on the same samples.
+    """
+    a, b = estimate(row_a, metric, slice_name), estimate(row_b, metric, slice_name)
+    if a is None or b is None or a.value is None or b.value is None:
+        return None
+    replicates_a, replicates_b = (mean_replicates_of(row, metric, slice_name) for row in (row_a, row_b))
+    if replicates_a is None or replicates_b is None:
+        return None
+    n_clusters = _shared_clusters(row_a, row_b, slice_name)
+    try:
+        return replicate_difference(a.value, b.value, replicates_a, replicates_b, n_clusters)
+    except ValueError as error:
+        raise BadRecord(f"{row_a.method.name} against {row_b.method.name}, {metric}|{slice_name}: {error}") from error
+
+
+def _shared_clusters(row_a: Row, row_b: Row, slice_name: str) -> int:
+    """Number of clusters in the slice, after checking that all samples files of both rows list the same samples."""
+    first = row_a.samples[0]
+    for row in (row_a, row_b):
+        for samples in row.samples:
+            for name in ("sample_id", "cluster"):
+                if not np.array_equal(first[name], samples[name]):
+                    raise BadRecord(
+                        f"{row_a.method.name} and {row_b.method.name} were not scored on the same samples ({name}): "
+                        "their difference is not paired; run both with the same protocol and profile"
+                    )
+    inside = np.asarray(first.get(f"slice/{slice_name}", np.ones(len(first["cluster"]), dtype=bool)), dtype=bool)
+    return len(np.unique(first["cluster"][inside]))
+
+
+def tie_groups(rows: Sequence[Row], metric: str, slice_name: str) -> dict[str, int]:
+    """Rank of each method that can carry one, by method name; methods that are not separable share a rank.
+
+    Ranked are rows of kind method with status ok, not marked ``copies``, with a value and replicates. Every two of
+    them are compared (:func:`paired_difference`); two are *separable* if Holm's adjusted p over all these comparisons
+    is below 0.05. Sorted by value, best first, each method takes the rank of the best group leader it is not
+    separable from, or leads a new group whose rank is its place (:func:`reports.significance.leader_ranks`).
+    """
+    ranked = ranked_order(rows, metric, slice_name)
+    pairs = list(combinations(range(len(ranked)), 2))
+    p_values = []
+    for a, b in pairs:
+        difference = paired_difference(ranked[a], ranked[b], metric, slice_name)
+        p_values.append(1.0 if difference is None else difference.p)
+    separable = np.zeros((len(ranked), len(ranked)), dtype=np.bool_)
+    for (a, b), adjusted in zip(pairs, holm(p_values), strict=True):
+        separable[a, b] = separable[b, a] = adjusted < SIGNIFICANCE
+    return {row.method.name: rank for row, rank in zip(ranked, leader_ranks(separable), strict=True)}
+
+
+def ranked_order(rows: Sequence[Row], metric: str, slice_name: str) -> list[Row]:
+    """The rows that can carry a rank, best first; equal values in order of method name."""
+    able = [
+        row for row in rows if row.can_rank and row.samples and mean_replicates_of(row, metric, slice_name) is not None
+    ]
+    return [row for row in sorted_rows(able, metric, slice_name) if badness(row, metric, slice_name) < np.inf]
+
+
+def sorted_rows(rows: Iterable[Row], metric: str, slice_name: str) -> list[Row]:
+    """Rows best first by one metric; rows without a value last; ties in order of method name."""
+    return sorted(rows, key=lambda row: (badness(row, metric, slice_name), row.method.name))
+
+
+def badness(row: Row, metric: str, slice_name: str) -> float:
+    """A number that is lower for better rows, infinite where the value is undefined."""
+    found = estimate(row, metric, slice_name)
+    if found is None or found.value is None:
+        return float("inf")
+    return {
+        "higher": -found.value,
+        "lower": found.value,
+        "one": abs(found.value - 1.0),
+        "none": 0.0,
+    }[found.better]
+
+
+def variance_split(row: Row, metric: str, slice_name: str) -> VarianceSplit:
+    """How much a row's number owes to the judge seed, the method's own seed and the sampling of tasks."""
+    found = estimate(row, metric, slice_name)
+    if found is None or found.value is None:
+        return VarianceSplit(None, None, None)
+    name = f"replicates/{metric}|{slice_name}"
+    spreads = [float(np.nanvar(samples[name], ddof=1)) for samples in row.samples if name in samples]
+    return VarianceSplit(
+        judge_seed=found.judge_sd,
+        method_seed=found.seed_sd,
+        task_sampling=float(np.sqrt(np.mean(spreads))) if spreads else None,
+    )
+
+
+def front(rows: Sequence[Row], metrics: Sequence[str], slice_name: str) -> tuple[str, ...]:
+    """Names of the rows no other of ``rows`` beats on all ``metrics`` at once (Pareto front), in the order given."""
+    points = np.array([[-badness(row, metric, slice_name) for metric in metrics] for row in rows]).reshape(
+        len(rows), len(metrics)
+    )
+    return tuple(row.method.name for row, on_front in zip(rows, pareto_front(points), strict=True) if on_front)

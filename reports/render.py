@@ -1,0 +1,241 @@
+"""Tables as text: data frames of cells, Markdown, plain text, CSV, LaTeX (booktabs) and HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Literal
+
+import jinja2
+import pandas as pd
+from tabulate import tabulate
+
+from reports.aggregate import Estimate
+from reports.formatting import (
+    UNDEFINED,
+    escape_latex,
+    escape_markdown,
+    footnote_mark,
+    number,
+    one_line,
+    with_interval,
+)
+from reports.tables import SECTION_TITLES, Column, Part, Section, Table, TableRow
+
+Format = Literal["text", "md", "csv", "latex", "html"]
+TEMPLATES = Path(__file__).with_name("templates")
+FLOOR_TITLE = "floor: real against real, same n"
+
+
+def render(table: Table, form: Format, part: Part = "main") -> str:
+    """The table in one of the formats; CSV holds all columns and unrounded numbers, whatever ``part``."""
+    makers: dict[Format, Callable[[Table, Part], str]] = {
+        "text": to_text,
+        "md": to_markdown,
+        "csv": lambda table, part: to_csv(table),
+        "latex": to_latex,
+        "html": to_html,
+    }
+    return makers[form](table, part)
+
+
+def text_frame(table: Table, part: Part = "main") -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Cells as plain text, one line per row of the table in its order, and the footnotes they point to.
+
+    Columns: rank, row, the columns of ``part`` by their headers, notes. An undefined cell is ``–[a]`` and footnote a
+    says why; ``84.7[b]`` carries a warning. Nothing is escaped.
+    """
+    reasons: list[str] = []
+    lines = [[_rank_text(row), row.title, *_cells(table, part, row, reasons), _notes(row)] for row in table.rows]
+    headers = ["rank", "row", *(column.header for column in table.columns_of(part)), "notes"]
+    notes = tuple(f"[{footnote_mark(place)}] {reason}" for place, reason in enumerate(reasons))
+    return pd.DataFrame(lines, columns=pd.Index(headers), dtype=str), notes
+
+
+def _rank_text(row: TableRow) -> str:
+    return "" if row.rank is None else str(row.rank)
+
+
+def _cells(table: Table, part: Part, row: TableRow, reasons: list[str]) -> list[str]:
+    if row.section == "unfinished":
+        return [UNDEFINED for _ in table.columns_of(part)]
+    return [cell_text(column, row.estimates.get(column.key), reasons) for column in table.columns_of(part)]
+
+
+def cell_text(column: Column, found: Estimate | None, reasons: list[str]) -> str:
+    """One cell; its reason or warning, if any, goes to ``reasons`` (once) and its mark to the cell."""
+    reason = "not measured in this record" if found is None else found.reason
+    text = UNDEFINED
+    if found is not None and found.value is not None:
+        bounds = (found.low, found.high) if column.interval else (None, None)
+        text = with_interval(found.value, *bounds, column.unit)
+    if not reason:
+        return text
+    if one_line(reason) not in reasons:
+        reasons.append(one_line(reason))
+    return f"{text}[{footnote_mark(reasons.index(one_line(reason)))}]"
+
+
+def _notes(row: TableRow) -> str:
+    notes = ", ".join(row.marks)
+    if not row.row.reason:
+        return notes
+    log = row.row.stored[0].record.log if row.section == "unfinished" else ""
+    return f"{notes}: {one_line(row.row.reason)}" + (f" ({log})" if log else "")
+
+
+def floor_cells(table: Table, part: Part = "main") -> list[str] | None:
+    """Real against real at the same n for each column of ``part`` (``–`` where it means nothing); None if none has one.
+
+    Floors are a property of data, judge and n; where rows state different ones, the range is shown.
+    """
+    cells = []
+    for column in table.columns_of(part):
+        found = [row.estimates[column.key].floor for row in table.rows if column.key in row.estimates]
+        known = [floor for floor in found if floor is not None]
+        ends = sorted({number(floor, column.unit) for floor in (min(known), max(known))}) if known else [UNDEFINED]
+        cells.append(" to ".join(ends))
+    return None if all(cell == UNDEFINED for cell in cells) else cells
+
+
+def number_frame(table: Table) -> pd.DataFrame:
+    """Unrounded numbers for scripts: a line per row; per column value, low, high, n, sd over seeds, floor."""
+    lines: list[dict[str, object]] = []
+    for row in table.rows:
+        line: dict[str, object] = {
+            "section": row.section,
+            "rank": row.rank,
+            "method": row.row.method.name,
+            "title": row.title,
+            "status": row.row.status,
+            "marks": ";".join(row.marks),
+            "reason": row.row.reason,
+        }
+        for column in table.columns:
+            found = row.estimates.get(column.key)
+            for field in ("value", "low", "high", "n", "seed_sd", "floor"):
+                name = column.key if field == "value" else f"{column.key}.{field}"
+                line[name] = None if found is None else getattr(found, field)
+        lines.append(line)
+    frame = pd.DataFrame(lines)
+    frame["rank"] = frame["rank"].astype("Int64")
+    return frame
+
+
+def sections(table: Table, part: Part = "main") -> tuple[list[tuple[Section, pd.DataFrame]], tuple[str, ...]]:
+    """Frames of cells by section, empty sections left out, and the footnotes of them all.
+
+    The floors are the last line of the anchors (of the methods, where there are no anchors). Only methods have a rank.
+    """
+    frame, notes = text_frame(table, part)
+    floors = floor_cells(table, part)
+    found: list[tuple[Section, pd.DataFrame]] = []
+    for section in SECTION_TITLES:
+        inside = [row.section == section for row in table.rows]
+        if any(inside):
+            found.append((section, frame[inside].reset_index(drop=True)))
+    if floors is not None and found:
+        place = max((at for at, (section, _) in enumerate(found) if section != "unfinished"), default=0)
+        section, chosen = found[place]
+        line = pd.DataFrame([["", FLOOR_TITLE, *floors, ""]], columns=chosen.columns)
+        found[place] = (section, pd.concat([chosen, line], ignore_index=True))
+    return [(section, _without_empty_rank(section, chosen)) for section, chosen in found], notes
+
+
+def _without_empty_rank(section: Section, frame: pd.DataFrame) -> pd.DataFrame:
+    if section == "unfinished":
+        return frame[["row", "notes"]]
+    return frame if section == "methods" else frame.drop(columns="rank")
+
+
+def _alignments(frame: pd.DataFrame) -> list[str]:
+    return ["left" if name in ("row", "notes") else "right" for name in frame.columns]
+
+
+def _tabulated(frame: pd.DataFrame, style: str, escape: Callable[[str], str]) -> str:
+    # Numbers stay readable in the source: only names and notes can hold characters that mean something.
+    words = [name in ("row", "notes") for name in frame.columns]
+    lines = [
+        [escape(str(cell)) if word else str(cell) for cell, word in zip(line, words, strict=True)]
+        for line in frame.itertuples(index=False)
+    ]
+    headers = [str(name) for name in frame.columns]
+    return tabulate(lines, headers=headers, tablefmt=style, disable_numparse=True, colalign=_alignments(frame))
+
+
+def to_markdown(table: Table, part: Part = "main") -> str:
+    """Pipe tables, one per section, with their titles in bold and the footnotes below."""
+    found, notes = sections(table, part)
+    blocks = [
+        f"**{SECTION_TITLES[section]}**\n\n{_tabulated(frame, 'pipe', escape_markdown)}" for section, frame in found
+    ]
+    if notes:
+        blocks.append("<br>\n".join(escape_markdown(note) for note in notes))
+    return "\n\n".join(blocks) + "\n"
+
+
+def to_text(table: Table, part: Part = "main") -> str:
+    """Plain text for a terminal or a log."""
+    found, notes = sections(table, part)
+    blocks = [table.title]
+    blocks += [f"{SECTION_TITLES[section]}\n{_tabulated(frame, 'simple', one_line)}" for section, frame in found]
+    blocks += ["\n".join(notes)] if notes else []
+    return "\n\n".join(blocks) + "\n"
+
+
+def to_csv(table: Table) -> str:
+    """:func:`number_frame` as CSV."""
+    return number_frame(table).to_csv(index=False, lineterminator="\n")
+
+
+def to_latex(table: Table, part: Part = "main") -> str:
+    """A booktabs ``tabular``; sections are parted by rules, footnotes follow in a ``flushleft`` block.
+
+    Needs ``\\usepackage{booktabs}``.
+    """
+    found, notes = sections(table, part)
+    headers = ["rank", "row", *(column.header for column in table.columns_of(part)), "notes"]
+    form = "".join("l" if name in ("row", "notes") else "r" for name in headers)
+    lines = [f"\\begin{{tabular}}{{{form}}}", r"\toprule", _latex_line(headers)]
+    for section, frame in found:
+        title = f"\\multicolumn{{{len(headers)}}}{{l}}{{\\emph{{{escape_latex(SECTION_TITLES[section])}}}}} \\\\"
+        lines += [r"\midrule", title]
+        whole = frame.reindex(columns=headers, fill_value="")
+        lines += [_latex_line([str(cell) for cell in line]) for line in whole.itertuples(index=False)]
+    lines += [r"\bottomrule", r"\end{tabular}"]
+    if notes:
+        lines += [
+            r"\begin{flushleft}\footnotesize",
+            *(escape_latex(note) + r"\\" for note in notes),
+            r"\end{flushleft}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _latex_line(cells: Sequence[str]) -> str:
+    # A cell that starts with a bracket would be read as the optional argument of the line break before it.
+    return " & ".join(("{}" if cell.startswith("[") else "") + escape_latex(cell) for cell in cells) + r" \\"
+
+
+def to_html(table: Table, part: Part = "main") -> str:
+    """A ``<table>`` element with sections as row groups and the footnotes below; style is left to the page."""
+    found, notes = sections(table, part)
+    headers = ["rank", "row", *(column.header for column in table.columns_of(part)), "notes"]
+    groups = [
+        (SECTION_TITLES[section], frame.reindex(columns=headers, fill_value="").to_numpy().tolist())
+        for section, frame in found
+    ]
+    template = environment().get_template("table.html")
+    return template.render(title=table.title, headers=headers, groups=groups, notes=notes)
+
+
+def environment() -> jinja2.Environment:
+    """Templates of this package: HTML is escaped, an undefined name is an error."""
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=jinja2.select_autoescape(["html"]),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
