@@ -1,0 +1,108 @@
+"""Finding an adapter: by name in the table, in a user's file, or as an installed entry point."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from bench.adapters import ADAPTERS
+from bench.adapters.base import Adapter
+from bench.errors import BadConfig, MethodFailed
+
+ENTRY_POINT_GROUP = "stylebench.adapters"
+
+
+@dataclass(frozen=True)
+class AdapterSource:
+    """Where an adapter comes from, in a form that another process can follow.
+
+    ``name`` alone means the table or an entry point; with ``file`` it is ``class_name``, or the only class, in there.
+    """
+
+    name: str
+    file: str = ""
+    class_name: str = ""
+
+
+def available_adapters() -> dict[str, type[Adapter]]:
+    """The table and all installed entry points of group ``stylebench.adapters``, by name."""
+    found = dict(ADAPTERS)
+    for point in entry_points(group=ENTRY_POINT_GROUP):
+        try:
+            adapter = point.load()
+        except Exception as error:
+            raise MethodFailed(
+                f"entry point {point.name!r} ({point.value}) cannot be imported: {error!r}",
+                remedy="repair or uninstall the package that declares it",
+            ) from error
+        found[adapter.name or point.name] = adapter
+    return found
+
+
+def find_adapter(source: AdapterSource) -> type[Adapter]:
+    """The class behind a source.
+
+    Raises
+    ------
+    BadConfig : no such name, file or class.
+    MethodFailed : the file raises when imported.
+    """
+    if source.file:
+        return _from_file(Path(source.file), source.class_name)
+    adapters = available_adapters()
+    if source.name not in adapters:
+        raise BadConfig(
+            f"unknown method {source.name!r}",
+            remedy=f"choose from {', '.join(adapters)}; 'stylebench list methods' describes them",
+        )
+    return adapters[source.name]
+
+
+def source_from_option(option: str) -> AdapterSource:
+    """``path/to/file.py`` or ``path/to/file.py:Class`` as a source with the adapter's own name.
+
+    Raises
+    ------
+    BadConfig : not a readable Python file, or not exactly one adapter in it and no class named.
+    """
+    path, _, class_name = option.partition(":")
+    file = Path(path).expanduser().resolve()
+    if not file.is_file() or file.suffix != ".py":
+        raise BadConfig(f"no Python file at {path}", where="--adapter", remedy="give FILE.py or FILE.py:Class")
+    adapter = _from_file(file, class_name)
+    return AdapterSource(adapter.name or file.stem, str(file), adapter.__name__)
+
+
+def _from_file(file: Path, class_name: str) -> type[Adapter]:
+    module_name = f"stylebench_adapter_{file.stem}"
+    spec = importlib.util.spec_from_file_location(module_name, file)
+    if spec is None or spec.loader is None:
+        raise BadConfig(f"{file} cannot be imported as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    sys.path.insert(0, str(file.parent))
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise MethodFailed(f"importing it raised {type(error).__name__}: {error}", where=str(file)) from error
+    finally:
+        sys.path.remove(str(file.parent))
+    own = {
+        name: value
+        for name, value in vars(module).items()
+        if isinstance(value, type) and issubclass(value, Adapter) and value.__module__ == module_name
+    }
+    if class_name and class_name not in own:
+        raise BadConfig(
+            f"no adapter class {class_name!r}", where=str(file), remedy=f"it has {', '.join(own) or 'none'}"
+        )
+    if not class_name and len(own) != 1:
+        raise BadConfig(
+            f"expected exactly one adapter class, found {', '.join(own) or 'none'}",
+            where=str(file),
+            remedy="name one with FILE.py:Class" if own else "subclass bench.adapters.base.Adapter",
+        )
+    return own[class_name] if class_name else next(iter(own.values()))
