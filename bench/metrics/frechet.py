@@ -316,7 +316,8 @@ class _FastPath:
         mean = generated.mean(axis=0)
         centred = generated - mean
         norms = np.einsum("nd,nd->n", centred, centred)
-        return cls(float(np.trace(covariance)), mean - real_mean, centred, centred @ lower, norms)
+        mapped = scipy.linalg.blas.dtrmm(1.0, lower, centred.T, lower=1, trans_a=1).T
+        return cls(float(np.trace(covariance)), mean - real_mean, centred, mapped, norms)
 
     def distance(self, counts: NDArray[np.int32]) -> float | None:
         """The distance with each generated row taken ``counts`` times; None where rounding would show."""

@@ -1,0 +1,213 @@
+"""Physics: worked out by hand on simple curves, invariances, monotone in the fault, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bench.arrays import FloatArray
+from bench.errors import BadInput
+from bench.metrics.physics import (
+    bone_drift,
+    estimated_floor,
+    float_height,
+    foot_skate,
+    jerk_per_sample,
+    penetration,
+    ratio_per_content,
+    ratio_to_reference,
+    skate_gmd,
+    speed_per_sample,
+    time_correlation,
+)
+
+FPS = 30.0
+
+
+def some_motion(seed: int = 0, n: int = 3, n_frames: int = 40, n_joints: int = 5) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(n_frames)[None, :, None, None] / FPS
+    phase, speed = rng.uniform(0, 6, (2, n, 1, n_joints, 3))
+    return np.asarray(rng.normal(size=(n, 1, n_joints, 3)) + 0.2 * np.sin(2.0 * speed * time_s + phase))
+
+
+def turned(positions: FloatArray, yaw_rad: float) -> FloatArray:
+    cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+    return np.asarray(positions @ np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]]))
+
+
+def test_jerk_and_speed_by_hand() -> None:
+    # x = t^3 has jerk 6 m/s^3; z = 2 t has speed 2 m/s and no jerk.
+    time_s = np.arange(10) / FPS
+    positions = np.zeros((1, 10, 2, 3))
+    positions[0, :, 0, 0], positions[0, :, 1, 2] = time_s**3, 2.0 * time_s
+    np.testing.assert_allclose(jerk_per_sample(positions, FPS, joints=[0]), 6.0, rtol=1e-9)
+    np.testing.assert_allclose(jerk_per_sample(positions, FPS), 3.0, rtol=1e-9)
+    np.testing.assert_allclose(speed_per_sample(positions, FPS, joints=[1]), 2.0, rtol=1e-12)
+
+
+def test_jerk_scales_with_time_and_ignores_place_and_turn() -> None:
+    motion = some_motion()
+    plain = jerk_per_sample(motion, FPS)
+    np.testing.assert_allclose(jerk_per_sample(motion, 2 * FPS), 8.0 * plain)
+    np.testing.assert_allclose(jerk_per_sample(turned(motion, 0.7) + 5.0, FPS), plain, rtol=1e-9)
+    assert (jerk_per_sample(np.repeat(motion[:, :1], 9, axis=1), FPS) == 0.0).all()
+
+
+def test_jerk_ratio_is_one_on_itself_and_grows_with_noise() -> None:
+    motion, rng = some_motion(), np.random.default_rng(1)
+    noise = rng.normal(size=motion.shape)
+    real = jerk_per_sample(motion, FPS)
+    ratios = [ratio_to_reference(real, jerk_per_sample(motion + s * noise, FPS)) for s in (0.0, 1e-3, 1e-2)]
+    assert ratios[0] == 1.0
+    assert ratios[0] < ratios[1] < ratios[2]
+
+
+def test_ratio_by_hand_and_per_content() -> None:
+    assert ratio_to_reference([1.0, 3.0], [4.0]) == 2.0
+    assert ratio_to_reference([4.0], [1.0, 3.0]) == 0.5
+    table = ratio_per_content([1.0, 3.0, 5.0], [0, 0, 1], [4.0, 10.0, 7.0], [0, 1, 2])
+    assert table == {0: 2.0, 1: 2.0}
+
+
+def test_time_correlation_of_itself_its_opposite_and_a_right_angle() -> None:
+    motion = some_motion()
+    np.testing.assert_allclose(time_correlation(motion, motion), 1.0)
+    np.testing.assert_allclose(time_correlation(motion, -motion), -1.0)
+    phase = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    source, output = np.zeros((2, 1, 64, 2, 3))
+    source[0, :, 1, 1], output[0, :, 1, 1] = np.sin(phase), np.sin(phase + np.pi / 3)
+    np.testing.assert_allclose(time_correlation(source, output), 0.5, rtol=1e-12)
+
+
+def test_time_correlation_ignores_posture_amplitude_and_root_path() -> None:
+    source, output = some_motion(0), some_motion(1)
+    plain = time_correlation(source, output)
+    posture, path = (
+        np.random.default_rng(2).normal(size=(3, 1, 5, 3)),
+        np.random.default_rng(3).normal(size=(3, 40, 1, 3)),
+    )
+    np.testing.assert_allclose(time_correlation(source, 3.0 * output + posture + path), plain, rtol=1e-9)
+    np.testing.assert_allclose(time_correlation(output, source), plain, rtol=1e-12)
+
+
+def test_time_correlation_falls_with_noise_and_is_nan_on_a_frozen_clip() -> None:
+    motion = some_motion()
+    noise = np.random.default_rng(4).normal(size=motion.shape)
+    falling = [time_correlation(motion, motion + s * noise).mean() for s in (0.0, 0.1, 1.0)]
+    assert falling[0] > falling[1] > falling[2]
+    frozen = np.repeat(motion[:, :1], 40, axis=1) + np.linspace(0, 1, 40)[None, :, None, None]
+    assert np.isnan(time_correlation(motion, frozen)).all()
+
+
+def chain(lengths: FloatArray) -> FloatArray:
+    """A straight chain along y: bone ``lengths`` ``[T, J - 1]`` give positions ``[1, T, J, 3]``."""
+    positions = np.zeros((1, len(lengths), lengths.shape[1] + 1, 3))
+    positions[0, :, 1:, 1] = np.cumsum(lengths, axis=1)
+    return positions
+
+
+def test_bone_drift_by_hand() -> None:
+    # Bone 1 swings between 0.9 and 1.1 around 1: 10 %. Bone 2 is 2.2 instead of 2: 10 %. Bone 3 is right.
+    lengths = np.array([[0.9, 2.2, 1.0], [1.1, 2.2, 1.0]])
+    reference = np.array([0.0, 1.0, 2.0, 1.0])
+    drift = bone_drift(chain(lengths), (-1, 0, 1, 2), reference)
+    np.testing.assert_allclose(drift, 20.0 / 3.0)
+    np.testing.assert_allclose(bone_drift(chain(lengths), (-1, 0, 1, 2), reference, joints=[0, 1, 2]), 10.0)
+    np.testing.assert_allclose(bone_drift(chain(lengths), (-1, 0, 1, 2), reference, joints=[3]), 0.0, atol=1e-12)
+
+
+def test_bone_drift_ignores_motion_scale_and_tiny_bones_and_grows_with_stretch() -> None:
+    rng = np.random.default_rng(5)
+    reference = np.array([0.0, 1.0, 0.5, 1e-5])
+    rigid = chain(np.repeat(reference[None, 1:], 6, axis=0))
+    moved = turned(rigid, 0.4) + rng.normal(size=(1, 6, 1, 3))
+    np.testing.assert_allclose(bone_drift(moved, (-1, 0, 1, 2), reference), 0.0, atol=1e-9)
+    stretched = [
+        bone_drift(chain(np.array([[1.0, 0.5, 0.0], [1.0 + s, 0.5, 9.0]])), (-1, 0, 1, 2), reference)[0]
+        for s in (0.0, 0.1, 0.3)
+    ]
+    assert 0.0 == stretched[0] < stretched[1] < stretched[2]
+    scaled = bone_drift(2.0 * chain(np.array([[1.1, 0.5, 0.0]])), (-1, 0, 1, 2), 2.0 * reference)
+    np.testing.assert_allclose(scaled, 5.0)
+
+
+def sliding_foot(speed_m_s: float, height_m: float = 0.0, n_frames: int = 31) -> FloatArray:
+    """Joint 0 a root overhead, joint 1 a foot that slides along x at ``height_m``, joint 2 one that stands on 0."""
+    positions = np.zeros((1, n_frames, 3, 3))
+    positions[0, :, 0, 1] = 1.0
+    positions[0, :, 1, 0] = speed_m_s * np.arange(n_frames) / FPS
+    positions[0, :, 1, 1] = height_m
+    return positions
+
+
+def test_foot_skate_by_hand() -> None:
+    np.testing.assert_allclose(foot_skate(sliding_foot(0.4), FPS, [1]), 40.0)
+    np.testing.assert_allclose(foot_skate(sliding_foot(0.4), FPS, [1, 2]), 20.0)
+    np.testing.assert_allclose(foot_skate(sliding_foot(0.4, height_m=0.2), FPS, [1, 2]), 0.0)
+    np.testing.assert_allclose(foot_skate(turned(sliding_foot(0.4), 1.0) + 7.0, FPS, [1]), 40.0)
+    assert (np.diff([foot_skate(sliding_foot(v), FPS, [1])[0] for v in (0.0, 0.2, 5.0)]) > 0).all()
+
+
+def test_contact_holds_between_its_two_heights() -> None:
+    positions = sliding_foot(0.3, n_frames=40)
+    positions[0, :, 1, 1] = np.repeat([0.10, 0.04, 0.0, 0.04], 10)
+    # Coming down at 4 cm is no contact; going up it still is: 19 of the 39 steps slide, the standing foot adds 39.
+    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 30.0 * 19 / (19 + 39))
+
+
+def test_no_contact_is_nan() -> None:
+    positions = sliding_foot(0.3, n_frames=2)
+    positions[0, :, 1, 1] = [0.0, 1.0]
+    assert np.isnan(foot_skate(positions, FPS, [1])).all()
+
+
+def test_skate_gmd_by_hand() -> None:
+    # 30 steps at 1 m/s; zeros beyond the ends leave averages of 0.6, 0.8, 1, ..., all over 0.5.
+    np.testing.assert_allclose(skate_gmd(sliding_foot(1.0), FPS, [1, 2]), 100.0)
+    np.testing.assert_allclose(skate_gmd(sliding_foot(0.49), FPS, [1, 2]), 0.0)
+    np.testing.assert_allclose(skate_gmd(sliding_foot(1.0, height_m=0.06), FPS, [1, 2]), 0.0)
+    # At 0.6 m/s the averages at the ends are 0.36 and 0.48: two steps at each end do not count.
+    np.testing.assert_allclose(skate_gmd(sliding_foot(0.6), FPS, [1, 2]), 100.0 * 26 / 30)
+
+
+def test_floor_penetration_and_float() -> None:
+    positions = sliding_foot(0.0, n_frames=100)
+    positions[0, :, 1:, 1] = np.repeat([0.10, -0.02], 50)[:, None]
+    np.testing.assert_allclose(estimated_floor(positions, [1, 2]), -0.02)
+    np.testing.assert_allclose(penetration(positions, [1, 2]), 1.0)
+    np.testing.assert_allclose(float_height(positions, [1, 2]), 5.0)
+    np.testing.assert_allclose(penetration(positions, [1, 2], floor_m=0.10), 6.0)
+    np.testing.assert_allclose(float_height(positions, [1, 2], floor_m=-0.02), 6.0)
+    positions[0, 0, 1, 1] = -5.0
+    assert estimated_floor(positions, [1, 2])[0] > -0.05
+
+
+def test_refusals() -> None:
+    motion = some_motion()
+    broken = motion.copy()
+    broken[0, 0, 0, 0] = np.nan
+    with pytest.raises(BadInput, match="positions_m must be finite, got 1 NaN"):
+        jerk_per_sample(broken, FPS)
+    with pytest.raises(BadInput, match="positions_m must have at least 4 frames, got 3"):
+        jerk_per_sample(motion[:, :3], FPS)
+    with pytest.raises(BadInput, match=r"positions_m must have shape \[any, any, any, 3\]"):
+        speed_per_sample(motion[0], FPS)
+    with pytest.raises(BadInput, match="fps must be positive, got 0"):
+        jerk_per_sample(motion, 0.0)
+    with pytest.raises(BadInput, match=r"joints must be different indices in 0\.\.4, got \[5\]"):
+        jerk_per_sample(motion, FPS, joints=[5])
+    with pytest.raises(BadInput, match="the mean of reference must be positive"):
+        ratio_to_reference([0.0], [1.0])
+    with pytest.raises(BadInput, match="output must not be negative"):
+        ratio_to_reference([1.0], [-1.0])
+    with pytest.raises(BadInput, match="output_positions_m must match the source's"):
+        time_correlation(motion, motion[:, :-1])
+    with pytest.raises(BadInput, match="parents must name 5 joints, got 2"):
+        bone_drift(motion, (-1, 0), np.ones(5))
+    with pytest.raises(BadInput, match="no bone of at least 1 mm is left"):
+        bone_drift(motion, (-1, 0, 1, 2, 3), np.zeros(5))
+    with pytest.raises(BadInput, match=r"reference_lengths_m must have shape \[3, 5\]"):
+        bone_drift(motion, (-1, 0, 1, 2, 3), np.ones(4))
+    with pytest.raises(BadInput, match="joints must be different indices"):
+        foot_skate(motion, FPS, [])
