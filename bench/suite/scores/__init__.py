@@ -1,6 +1,7 @@
 """How the transfer track computes each of its metrics. SCORES is the table of all.
 
-Each metric is one function of a row and the shared reference, so that each can be computed, stored and recomputed alone.
+Each metric is one function of a row and the shared reference, so that each can be computed, stored and recomputed
+alone.
 """
 
 from __future__ import annotations

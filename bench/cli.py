@@ -1,0 +1,259 @@
+"""The command line. Each command is thin: it calls one function that a notebook could call too."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bench import __version__, console
+from bench.errors import BadConfig, BenchError
+
+RUNS = Path("runs")
+STORE = RUNS / "store"
+
+app = typer.Typer(
+    name="stylebench",
+    help="Benchmark and evaluation harness for human-motion style transfer.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    add_completion=False,
+)
+
+
+def main() -> None:
+    """Entry point: errors of our own become one line and exit code 2."""
+    from reports.records import BadRecord
+
+    try:
+        app()
+    except (BenchError, BadRecord) as error:
+        console.complain(str(error))
+        sys.exit(2)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False) -> None:
+    if version:
+        console.say(f"stylebench {__version__}")
+        raise typer.Exit()
+
+
+@app.command()
+def run(
+    data: Annotated[
+        list[str] | None, typer.Option(help="Dataset as NAME or NAME=PATH; repeat for several. Default: procedural.")
+    ] = None,
+    methods: Annotated[str, typer.Option(help="Comma-separated names; default: all anchor rows.")] = "",
+    adapter: Annotated[list[str] | None, typer.Option(help="Your adapter, FILE.py or FILE.py:Class.")] = None,
+    tracks: Annotated[str, typer.Option(help="Comma-separated tracks.")] = "transfer",
+    profile: Annotated[str, typer.Option(help="quick (1000 samples) or standard (2500).")] = "quick",
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<time>, and runs/latest.")] = None,
+    store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
+    jobs: Annotated[int, typer.Option(min=1, help="Cells at a time.")] = 2,
+    seed: Annotated[int, typer.Option(help="Method seed.")] = 0,
+    budget: Annotated[str, typer.Option(help="Training budget of methods that fit.")] = "small",
+    split: Annotated[str, typer.Option(help="default, contiguous or interleaved.")] = "default",
+    retrain_judges: Annotated[bool, typer.Option(help="Train judges here; do not use the committed ones.")] = False,
+    dry_run: Annotated[bool, typer.Option(help="Print cells, minutes and disk; run nothing.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print results as JSON.")] = False,
+) -> None:
+    """Run methods on datasets and print the table.
+
+    Example: stylebench run --data bandai-namco=bandai.zip --methods copy-content,copy-style
+    """
+    from bench.suite import run as suite
+
+    request = suite.RunRequest(
+        data=_data_options(data or ["procedural"]),
+        out=out or suite.default_out(RUNS),
+        store=store,
+        methods=_names(methods),
+        adapter_files=tuple(adapter or ()),
+        tracks=_names(tracks),
+        profile=profile,
+        jobs=jobs,
+        seed=seed,
+        budget=budget,
+        split=split,
+        retrain_judges=retrain_judges,
+        command=shlex.join(["stylebench", *sys.argv[1:]]),
+    )
+    if dry_run:
+        _print_plan(request, as_json)
+        return
+    with console.ProgressDisplay() as progress:
+        result = suite.run(request, progress)
+    if out is None:
+        suite.latest_link(request.out)
+    failed = _report_run(request.out, as_json, f"{result.generated} cells generated, {result.scored} metrics computed")
+    if failed:
+        raise typer.Exit(1)
+
+
+@app.command(name="list")
+def list_(
+    what: Annotated[str, typer.Argument(help="datasets, methods, protocols or metrics")],
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+) -> None:
+    """List what there is.
+
+    Example: stylebench list metrics
+    """
+    from bench.suite.listing import listing
+
+    headers, rows = listing(what)
+    if as_json:
+        console.say_json([dict(zip(headers, row, strict=True)) for row in rows])
+    else:
+        console.show_rows(headers, rows)
+
+
+data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(data_app, name="data")
+
+
+@data_app.command()
+def info(
+    name: Annotated[str, typer.Argument(help="NAME or NAME=PATH")],
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+) -> None:
+    """Print counts, durations, split and licence of a dataset.
+
+    Example: stylebench data info bandai-namco=bandai.zip
+    """
+    from bench.datasets import load_dataset
+    from bench.suite.listing import dataset_table, describe_dataset
+
+    [(dataset_name, path)] = _data_options([name]).items()
+    with console.ProgressDisplay() as progress:
+        dataset = load_dataset(dataset_name, path, lambda what, done, total: progress("data", what, done, total))
+    facts = describe_dataset(dataset)
+    if as_json:
+        console.say_json(facts)
+        return
+    for key, value in facts.items():
+        console.say(f"{key}: {value}")
+    console.show_rows(*dataset_table(dataset), title="takes by content and style")
+
+
+@app.command()
+def report(
+    run_folder: Annotated[Path, typer.Argument(help="A run folder.")],
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+) -> None:
+    """Write tables and figures of a run from its records, and print the table.
+
+    Example: stylebench report runs/latest
+    """
+    if _report_run(run_folder, as_json, ""):
+        raise typer.Exit(1)
+
+
+@app.command()
+def leaderboard(
+    check: Annotated[bool, typer.Option("--check", help="Only compare; exit 1 on a difference.")] = False,
+    records: Annotated[Path, typer.Option(help="Folder of published records.")] = Path("reports/published"),
+    path: Annotated[Path, typer.Option(help="The page.")] = Path("leaderboard.md"),
+) -> None:
+    """Write leaderboard.md from the published records, or check that it is current.
+
+    Example: stylebench leaderboard --check
+    """
+    from reports.leaderboard import check as compare
+    from reports.leaderboard import render_leaderboard
+    from reports.records import write_text_atomically
+
+    if not records.is_dir():
+        raise BadConfig(f"no folder of records at {records}", remedy="run this in the repository, or give --records")
+    if check:
+        difference = compare(path, records)
+        if difference:
+            console.say(difference)
+            raise typer.Exit(1)
+        return
+    write_text_atomically(path, render_leaderboard(records))
+    console.say(f"wrote {path}")
+
+
+@app.command()
+def clean(
+    runs: Annotated[Path, typer.Option(help="Folder of runs.")] = RUNS,
+    everything: Annotated[bool, typer.Option("--all", help="Also remove run folders, not only the store.")] = False,
+) -> None:
+    """Remove stored intermediate results; run folders stay unless --all is given.
+
+    Example: stylebench clean
+    """
+    target = runs if everything else runs / "store"
+    if target.name != "store" and not (target / "store").is_dir() and not (target / "latest").exists():
+        raise BadConfig(f"{target} does not look like a folder of runs", remedy="give --runs")
+    if target.is_dir():
+        shutil.rmtree(target)
+    console.say(f"removed {target}")
+
+
+def _names(option: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in option.split(",") if name.strip())
+
+
+def _data_options(options: list[str]) -> dict[str, Path | None]:
+    found: dict[str, Path | None] = {}
+    for option in options:
+        name, has_path, path = option.partition("=")
+        if name in found:
+            raise BadConfig(f"dataset {name!r} is given twice", where="--data")
+        found[name] = Path(path).expanduser() if has_path else None
+    return found
+
+
+def _print_plan(request: object, as_json: bool) -> None:
+    from bench.suite import run as suite
+
+    if not isinstance(request, suite.RunRequest):
+        raise BadConfig("not a run request")
+    with console.ProgressDisplay() as progress:
+        plans = suite.dry_run(request, progress)
+    rows = [
+        [
+            setting.dataset.dataset_id,
+            setting.protocol.protocol_id,
+            str(cost.cells),
+            str(cost.to_generate),
+            f"{cost.minutes:.1f}",
+            f"{cost.disk_mb:.0f}",
+        ]
+        for setting, _, cost in plans
+    ]
+    headers = ["dataset", "protocol", "cells", "to generate", "minutes", "MB on disk"]
+    if as_json:
+        console.say_json([dict(zip(headers, row, strict=True)) for row in rows])
+    else:
+        console.show_rows(headers, rows)
+
+
+def _report_run(folder: Path, as_json: bool, summary: str) -> bool:
+    """Write and print a run's tables; True where a cell failed."""
+    from bench.suite.output import failures, write_report
+
+    texts = write_report(folder)
+    failed = failures(folder)
+    if as_json:
+        console.say_json({"run": str(folder), "summary": summary, "failed": failed})
+        return bool(failed)
+    if summary:
+        console.say(f"{summary}; records, tables and figures in {folder}")
+    for name, reason in failed.items():
+        console.complain(f"{name}: {reason}")
+    for text in texts:
+        console.say(text)
+    return bool(failed)

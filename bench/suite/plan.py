@@ -1,0 +1,104 @@
+"""The plan of a run: its cells, the keys that decide their numbers, and what is still to be done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bench.adapters.base import Adapter
+from bench.adapters.loading import AdapterSource, find_adapter
+from bench.adapters.oracles import Oracle, ProceduralTruth
+from bench.suite.keys import adapter_digest, fit_key, generate_key
+from bench.suite.setting import Setting
+from bench.suite.store import Store
+from reports.records import MethodFacts
+
+SECONDS_PER_1000_SAMPLES = {"generate": 6.0, "score": 14.0}
+"""Rough cost of a cell on one core, for ``--dry-run``; measured on the anchor rows."""
+BYTES_PER_FRAME = 21 * 16 + 12
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Method x protocol x dataset x seed: the unit that is run, cached, failed and resumed.
+
+    ``unsupported`` says why the cell cannot be run at all; empty where it can.
+    """
+
+    source: AdapterSource
+    facts: MethodFacts
+    seed: int
+    budget: str
+    fit_key: str
+    motions_key: str
+    given: bool
+    unsupported: str = ""
+
+
+def plan_cells(
+    setting: Setting, sources: Sequence[AdapterSource], *, seed: int, budget: str, device: str
+) -> list[Cell]:
+    """The cells of a run, in the order of ``sources``."""
+    return [_cell(setting, source, find_adapter(source), seed, budget, device) for source in sources]
+
+
+def _cell(setting: Setting, source: AdapterSource, adapter: type[Adapter], seed: int, budget: str, device: str) -> Cell:
+    digest = adapter_digest(adapter)
+    fitted = fit_key(digest, setting.part_digest("fit"), budget, seed, device) if adapter.fits() else ""
+    return Cell(
+        source=source,
+        facts=_facts(source, adapter, digest, budget, seed),
+        seed=seed,
+        budget=budget,
+        fit_key=fitted,
+        motions_key=generate_key(fitted or digest, setting.tasks_digest, seed),
+        given=not issubclass(adapter, Oracle),
+        unsupported=_unsupported(adapter, setting),
+    )
+
+
+def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: str, seed: int) -> MethodFacts:
+    traits = adapter.traits
+    trained = traits.trained_on
+    if adapter.fits() and adapter.kind == "method":
+        trained = f"fit part, budget {budget}, seed {seed}"
+    return MethodFacts(
+        name=adapter.name or source.name,
+        title=adapter.title or adapter.name or source.name,
+        kind="anchor" if adapter.kind == "anchor" else "method",
+        description=adapter.description,
+        digest=digest,
+        needs_content_label=traits.needs_content_label,
+        needs_style_label=traits.needs_style_label,
+        uses_judge=traits.uses_judge,
+        trained_on=trained,
+        draws_from=adapter.draws_from,
+    )
+
+
+def _unsupported(adapter: type[Adapter], setting: Setting) -> str:
+    if issubclass(adapter, ProceduralTruth) and setting.dataset.name != "procedural":
+        return "true answers exist for the procedural dataset only"
+    if setting.protocol.needs not in adapter.capabilities() and not issubclass(adapter, Oracle):
+        return f"the {setting.protocol.track} track needs an adapter that {setting.protocol.needs}"
+    return ""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a run would still cost."""
+
+    cells: int
+    to_generate: int
+    minutes: float
+    disk_mb: float
+
+
+def estimate(setting: Setting, cells: Sequence[Cell], store: Store, jobs: int) -> Estimate:
+    """Rough cost of what the store does not have yet."""
+    runnable = [cell for cell in cells if not cell.unsupported]
+    waiting = [cell for cell in runnable if not store.has("motions", cell.motions_key)]
+    per_cell = len(setting.tasks) / 1000.0
+    seconds = per_cell * sum(SECONDS_PER_1000_SAMPLES.values()) * len(waiting)
+    size = len(waiting) * len(setting.tasks) * setting.protocol.window_frames * BYTES_PER_FRAME
+    return Estimate(len(cells), len(waiting), seconds / max(jobs, 1) / 60.0, size / 2**20)
