@@ -63,6 +63,11 @@ class Encoder(nn.Module):
             nn.Conv1d(middle, wide, 2), nn.BatchNorm1d(wide), nn.ReLU(),
         )  # fmt: skip
 
+    @property
+    def n_parameters(self) -> int:
+        """Learned numbers."""
+        return sum(parameter.numel() for parameter in self.parameters())
+
     def settle_signs(self, rotations_wxyz: Tensor) -> Tensor:
         return one_hemisphere(rotations_wxyz, self.reference_wxyz)
 
@@ -110,7 +115,7 @@ class Autoencoder(nn.Module):
 
 
 def squared_half_angles(left_wxyz: Tensor, right_wxyz: Tensor) -> Tensor:
-    """``arccos(|q . q'|)**2`` of unit quaternions ``[..., 4] -> [...]`` (Style-ERD 2022, appendix).
+    """``arccos(|q . q'|)**2`` of unit quaternions ``[..., 4] -> [...]`` (Style-ERD 2022, appendix A).
 
     Written with the chord, ``2 arcsin(|q - q'| / 2)``: value and gradient stay exact near 0, where arccos has none.
     """

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
-from torch import Tensor
+from torch import Tensor, nn
+
+from classifiers.autoencoder import AutoencoderConfig, Encoder
+from classifiers.stgcn import Stgcn, StgcnConfig
 
 FORMAT = "stylebench-judge/1"
+Model = TypeVar("Model", bound=nn.Module)
 
 
 class BadCheckpoint(ValueError):
@@ -92,18 +96,46 @@ def read_checkpoint(path: Path, kind: str) -> Checkpoint:
     return checkpoint
 
 
-def load_weights(model: torch.nn.Module, checkpoint: Checkpoint, path: Path) -> None:
-    """Put a checkpoint's tensors into a network built from its settings, and set evaluation mode.
+def checkpoint_of(model: Stgcn | Encoder, judge_id: str) -> Checkpoint:
+    """What is stored of a trained network."""
+    kind = "stgcn" if isinstance(model, Stgcn) else "autoencoder"
+    return Checkpoint(kind, {"id": judge_id, "network": asdict(model.config)}, model.state_dict())
+
+
+def load_classifier(path: Path) -> tuple[Stgcn, str]:
+    """A classifier in evaluation mode and its digest.
 
     Raises
     ------
-    BadCheckpoint : names or shapes that do not fit.
+    BadCheckpoint : see :func:`read_checkpoint`; also settings or weights that do not fit each other.
     """
+    checkpoint = read_checkpoint(path, "stgcn")
+    model = _fitting(path, checkpoint, lambda network: Stgcn(StgcnConfig(**network)))
+    return model, checkpoint.digest
+
+
+def load_encoder(path: Path) -> tuple[Encoder, str]:
+    """An auto-encoder's encoder in evaluation mode and its digest.
+
+    Raises
+    ------
+    BadCheckpoint : see :func:`read_checkpoint`; also settings or weights that do not fit each other.
+    """
+    checkpoint = read_checkpoint(path, "autoencoder")
+    model = _fitting(path, checkpoint, lambda network: Encoder(AutoencoderConfig(**network)))
+    return model, checkpoint.digest
+
+
+def _fitting(path: Path, checkpoint: Checkpoint, build: Callable[[dict[str, Any]], Model]) -> Model:
     try:
+        network = checkpoint.settings["network"]
+        # drawing initial weights must not move the caller's random numbers
+        with torch.random.fork_rng(devices=[]):
+            model = build({key: tuple(value) if isinstance(value, list) else value for key, value in network.items()})
         model.load_state_dict(dict(checkpoint.tensors))
-    except RuntimeError as error:
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise BadCheckpoint(f"{path}: its weights do not fit its settings ({' '.join(str(error).split())})") from error
-    model.eval()
+    return model.eval()
 
 
 def _canonical(value: object) -> str:

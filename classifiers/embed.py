@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from classifiers.autoencoder import Encoder
+from classifiers.autoencoder import Autoencoder, Encoder, squared_half_angles
 from classifiers.data import checked_features
 from classifiers.stgcn import Stgcn
 
@@ -72,6 +72,13 @@ def encode(model: Encoder, rotations_wxyz: NDArray[np.floating]) -> Encoded:
     activations = _in_batches(model, checked_features(rotations_wxyz, model.config.input_shape)).double().numpy()
     mean, components = (part.double().numpy() for part in (model.mean, model.components))
     return Encoded(activations, (activations - mean) @ components.T)
+
+
+def reconstruction_angle_deg(model: Autoencoder, rotations_wxyz: NDArray[np.floating]) -> float:
+    """Root mean square rotation between clean input ``[n, 24, V, 4]`` and the auto-encoder's output, degrees."""
+    clean = checked_features(rotations_wxyz, model.config.input_shape)
+    decoded = _in_batches(model, clean)
+    return float(np.degrees(2.0 * squared_half_angles(decoded, clean).double().mean().sqrt().item()))
 
 
 def _in_batches(function: Callable[[Tensor], Tensor], samples: Tensor) -> Tensor:

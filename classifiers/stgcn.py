@@ -36,7 +36,7 @@ class StgcnConfig:
     n_frames: int = 64
     frame_step: int = 2
     widths: tuple[int, ...] = (16, 32, 64)
-    strides: tuple[int, ...] = (1, 2, 2)
+    strides: tuple[int, ...] = (2, 2, 1)
     temporal_kernel: int = 5
     dropout: float = 0.0
     faithful: bool = False
@@ -66,6 +66,11 @@ class Stgcn(nn.Module):
         )  # fmt: skip
         self.drop = nn.Dropout(config.dropout)
         self.last = nn.Linear(config.widths[-1], config.n_classes)
+
+    @property
+    def n_parameters(self) -> int:
+        """Learned numbers."""
+        return sum(parameter.numel() for parameter in self.parameters())
 
     def features(self, windows: Tensor) -> Tensor:
         """Global mean over time and joints before the last layer, ``[B, widths[-1]]``."""

@@ -1,0 +1,239 @@
+"""Training and measuring the judges of one dataset and split; :mod:`bench.suite.judges` is the door to it."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.arrays import IntArray
+from bench.datasets.base import Dataset, ProgressCallback
+from bench.datasets.split import Split, leak
+from bench.datasets.take import Take
+from bench.errors import BadData
+from bench.motion.edit import windows
+from bench.motion.representation import JUDGE_SLICES
+from bench.motion.skeleton import CANONICAL_PARENTS, N_JOINTS
+from bench.suite.judge_card import (
+    AutoencoderFacts,
+    ClassifierFacts,
+    JudgeCard,
+    OtherSplit,
+    Repeat,
+    recognition,
+    within_session,
+)
+from bench.suite.motions import Motions
+from classifiers.autoencoder import Autoencoder, AutoencoderConfig, Encoder
+from classifiers.checkpoint import checkpoint_of
+from classifiers.embed import classify, encode, reconstruction_angle_deg
+from classifiers.stgcn import Stgcn, StgcnConfig
+from classifiers.train import History, TrainingConfig, train_autoencoder, train_classifier
+
+WINDOW_FRAMES = 64
+STRIDE_FRAMES = 32
+CENTRE = slice(20, 44)
+"""The 24 frames of a window that the auto-encoder reads."""
+
+CLASSIFIER_TRAINING = TrainingConfig(n_steps=200)
+AUTOENCODER_TRAINING = TrainingConfig(n_steps=1200, peak_rate=2e-3)
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """Networks by seed, for each target, and the card that describes them."""
+
+    classifiers: dict[str, tuple[Stgcn, ...]]
+    encoders: tuple[Encoder, ...]
+    card: JudgeCard
+
+
+def centre_rotations(features: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The auto-encoder's input ``[n, 24, 21, 4]`` out of judge features ``[n, 64, 21, 7]``."""
+    return features[:, CENTRE, :, JUDGE_SLICES["rotation_wxyz"]]
+
+
+def train_all(
+    dataset: Dataset, split: Split, seeds: Sequence[int], unseen: Sequence[Take], progress: ProgressCallback | None
+) -> Trained:
+    """Train every judge on the split's judge part, measure it on the test and real parts; no gate."""
+    parts = _Parts.of(dataset, split, unseen)
+    classifiers: dict[str, tuple[Stgcn, ...]] = {}
+    facts: list[ClassifierFacts] = []
+    for target in _targets(dataset):
+        runs = [_train_classifier(parts, dataset, target, seed, progress) for seed in seeds]
+        classifiers[target] = tuple(model for model, _ in runs)
+        facts += [_classifier_facts(*run, parts, target, seed) for run, seed in zip(runs, seeds, strict=True)]
+    coded = [_train_autoencoder(parts, seed, progress) for seed in seeds]
+    coder_facts = [_autoencoder_facts(*run, parts, seed) for run, seed in zip(coded, seeds, strict=True)]
+    found = leak(dataset.takes, split)
+    card = JudgeCard(
+        dataset_id=dataset.dataset_id, dataset_digest=dataset.digest, licence=dataset.licence,
+        citation=dataset.citation, split_kind=split.kind, split_seed=split.seed, split_digest=split.digest,
+        leak_share=_finite(found.share), leak_chance=_finite(found.chance),
+        n_training_windows=len(parts.judge.features), content_labels=dataset.content_labels,
+        style_labels=dataset.style_labels,
+        native_labels=dataset.native_content_labels if "native" in classifiers else (),
+        classifiers=tuple(facts), autoencoders=tuple(coder_facts), versions=_versions(),
+    )  # fmt: skip
+    return Trained(classifiers, tuple(model.encoder for model, _ in coded), card)
+
+
+def measure_split(
+    dataset: Dataset, split: Split, seeds: Sequence[int], progress: ProgressCallback | None = None
+) -> tuple[OtherSplit, ...]:
+    """Accuracy of classifiers trained in the same way on another split; the networks are thrown away."""
+    parts = _Parts.of(dataset, split, ())
+    found = leak(dataset.takes, split)
+    rows = []
+    for target in _targets(dataset):
+        for seed in seeds:
+            facts = _classifier_facts(*_train_classifier(parts, dataset, target, seed, progress), parts, target, seed)
+            rows.append(OtherSplit(
+                kind=split.kind, target=target, seed=seed, accuracy=facts.pooled.accuracy,
+                balanced_accuracy=facts.pooled.balanced_accuracy, leak_share=_finite(found.share),
+                leak_chance=_finite(found.chance),
+            ))  # fmt: skip
+    return tuple(rows)
+
+
+def train_again(dataset: Dataset, split: Split, known: ClassifierFacts, model: Stgcn, condition: str) -> Repeat:
+    """Train one classifier once more and compare it with the first result."""
+    parts = _Parts.of(dataset, split, ())
+    other, history = _train_classifier(parts, dataset, known.target, known.seed, None)
+    facts = _classifier_facts(other, history, parts, known.target, known.seed)
+    same = classify(other, parts.held_out).predicted == classify(model, parts.held_out).predicted
+    return Repeat(
+        condition=condition, same_bytes=facts.digest == known.digest, same_predictions=100.0 * float(np.mean(same)),
+        accuracy=facts.pooled.accuracy,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Windows of some takes ``[n, 64, 21, 7]`` with the class indices of each target."""
+
+    features: NDArray[np.float32]
+    index: dict[str, IntArray]
+    sessions: list[str | None]
+
+    @classmethod
+    def of(cls, dataset: Dataset, takes: Sequence[Take]) -> _Windows:
+        pairs = [(take, part) for take in takes for _, part in windows(take.clip, WINDOW_FRAMES, STRIDE_FRAMES)]
+        features = Motions.of([take.with_clip(part) for take, part in pairs]).window_features()
+        judged = [dataset.judged_content.get(str(take.content)) for take, _ in pairs]
+        index = {
+            "content": _indices(dataset.content_labels, judged),
+            "style": _indices(dataset.style_labels, [take.style for take, _ in pairs]),
+            "native": _indices(dataset.native_content_labels, [take.content for take, _ in pairs]),
+        }
+        return cls(features.astype(np.float32), index, [take.session for take, _ in pairs])
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What training and measuring need of a split."""
+
+    judge: _Windows
+    test: _Windows
+    real: _Windows
+    unseen: _Windows | None
+
+    @classmethod
+    def of(cls, dataset: Dataset, split: Split, unseen: Sequence[Take]) -> _Parts:
+        judge, test, real = (
+            _Windows.of(dataset, split.select(dataset.takes, part)) for part in ("judge", "test", "real")
+        )
+        return cls(judge, test, real, _Windows.of(dataset, unseen) if unseen else None)
+
+    @property
+    def held_out(self) -> NDArray[np.float32]:
+        return np.concatenate([self.test.features, self.real.features])
+
+
+def _indices(labels: tuple[str, ...], found: Sequence[str | None]) -> IntArray:
+    place = {label: index for index, label in enumerate(labels)}
+    unknown = sorted({str(label) for label in found if label not in place})
+    if unknown:
+        raise BadData(f"judges need every take labelled with one of {', '.join(labels)}; got {', '.join(unknown)}")
+    return np.array([place[str(label)] for label in found], dtype=np.int64)
+
+
+def _targets(dataset: Dataset) -> dict[str, tuple[str, ...]]:
+    merged = len(dataset.native_content_labels) != len(dataset.content_labels)
+    targets = {"content": dataset.content_labels, "style": dataset.style_labels}
+    return targets | ({"native": dataset.native_content_labels} if merged else {})
+
+
+def _train_classifier(
+    parts: _Parts, dataset: Dataset, target: str, seed: int, progress: ProgressCallback | None
+) -> tuple[Stgcn, History]:
+    network = StgcnConfig(CANONICAL_PARENTS, len(_targets(dataset)[target]))
+    step = _step_callback(progress, f"{target} judge {seed}")
+    return train_classifier(
+        parts.judge.features, parts.judge.index[target], network, CLASSIFIER_TRAINING, seed=seed, progress=step
+    )
+
+
+def _train_autoencoder(parts: _Parts, seed: int, progress: ProgressCallback | None) -> tuple[Autoencoder, History]:
+    rotations = centre_rotations(parts.judge.features)
+    step = _step_callback(progress, f"auto-encoder {seed}")
+    return train_autoencoder(rotations, AutoencoderConfig(N_JOINTS), AUTOENCODER_TRAINING, seed=seed, progress=step)
+
+
+def _classifier_facts(model: Stgcn, history: History, parts: _Parts, target: str, seed: int) -> ClassifierFacts:
+    judged = classify(model, parts.held_out)
+    true = np.concatenate([parts.test.index[target], parts.real.index[target]])
+    right = judged.predicted == true
+    n_test = len(parts.test.features)
+    session = None
+    if target == "style":
+        session = within_session(true, judged.log_probabilities, [*parts.test.sessions, *parts.real.sessions])
+    unseen = None
+    if parts.unseen is not None:
+        unseen = _percent(classify(model, parts.unseen.features).predicted == parts.unseen.index[target])
+    judge_id = f"stgcn-{target}/{seed}"
+    return ClassifierFacts(
+        id=judge_id, target=target, seed=seed, file=f"{target}-{seed}.safetensors",
+        digest=checkpoint_of(model, judge_id).digest, parameters=model.n_parameters,
+        training_seconds=history.seconds, pooled=recognition(true, judged.predicted, model.config.n_classes),
+        test_accuracy=_percent(right[:n_test]), real_accuracy=_percent(right[n_test:]),
+        within_session_accuracy=session[0] if session else None,
+        within_session_chance=session[1] if session else None, unseen_actor_accuracy=unseen,
+    )  # fmt: skip
+
+
+def _autoencoder_facts(model: Autoencoder, history: History, parts: _Parts, seed: int) -> AutoencoderFacts:
+    encoded = encode(model.encoder, centre_rotations(parts.judge.features))
+    share = encoded.components.var(axis=0).sum() / encoded.activations.var(axis=0).sum()
+    judge_id = f"autoencoder/{seed}"
+    return AutoencoderFacts(
+        id=judge_id, seed=seed, file=f"autoencoder-{seed}.safetensors",
+        digest=checkpoint_of(model.encoder, judge_id).digest, parameters=model.encoder.n_parameters,
+        training_seconds=history.seconds,
+        angle_deg=reconstruction_angle_deg(model, centre_rotations(parts.held_out)),
+        components_share=100.0 * float(share),
+    )  # fmt: skip
+
+
+def _percent(right: NDArray[np.bool_]) -> float:
+    return 100.0 * float(np.mean(right))
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _versions() -> dict[str, str]:
+    return {"python": platform.python_version(), "torch": version("torch"), "numpy": version("numpy")}
+
+
+def _step_callback(progress: ProgressCallback | None, what: str) -> Callable[[int, int], None] | None:
+    if progress is None:
+        return None
+    report = progress
+    return lambda done, total: report(what, done, total)
