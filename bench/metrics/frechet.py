@@ -33,10 +33,11 @@ from bench.metrics.conditional import (
 )
 
 ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+"""Relative rounding of an eigenvalue, generously."""
+EXACT_TOLERANCE, FAST_TOLERANCE = 4e-13, 1e-11
+"""Largest bound on the rounding of a sum of root eigenvalues, per trace; the bound itself is about 4 times too high."""
 SAFE_PIVOT_RATIO = 1e-5
-FAST_TOLERANCE = 1e-11
-"""Relative rounding of an eigenvalue, smallest allowed ratio of Cholesky pivots, and allowed error per trace: beyond
-them the fast path gives way to the exact one."""
+LARGE = 1024
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def frechet_between(real: FeatureStatistics, generated: FeatureStatistics) -> Fr
     """Frechet distance of two Gaussians: |mu_x - mu_y|^2 + tr S_x + tr S_y - 2 |R_x R_y'|_nuclear."""
     d = len(real.mean)
     trace = float(np.sum(real.factor**2) + np.sum(generated.factor**2))
-    singular = np.asarray(np.linalg.svd(real.factor @ generated.factor.T, compute_uv=False), dtype=np.float64)
+    singular = _singular_values(real.factor @ generated.factor.T, trace)
     value = float(np.sum((real.mean - generated.mean) ** 2) + trace - 2.0 * singular.sum())
     fewest = min(real.n, generated.n)
     warning = f"n = {fewest} is below 2 d = {2 * d}: the number would be mostly bias" if fewest < 2 * d else ""
@@ -328,13 +329,35 @@ class _FastPath:
         trace = self.real_trace + (weights @ self.squared_norms[rows] - n * (shift @ shift)) / (n - 1)
         scaled = self.mapped[rows]
         scaled = (scaled - weights @ scaled / n) * np.sqrt(weights / (n - 1))[:, None]
-        eigenvalues = np.clip(np.linalg.eigvalsh(scaled.T @ scaled), 0.0, None)
-        roots = np.sqrt(eigenvalues)
-        slack = ROUNDING * eigenvalues[-1]
-        if slack > 0 and np.sum(slack / (np.sqrt(eigenvalues + slack) + roots)) > FAST_TOLERANCE * trace:
+        roots, rounding = _root_eigenvalues(scaled.T @ scaled)
+        if rounding > FAST_TOLERANCE * trace:
             return None
         gap = self.mean_gap + shift
         return float(gap @ gap + trace - 2.0 * roots.sum())
+
+
+def _singular_values(matrix: FloatArray, trace: float) -> FloatArray:
+    """Singular values, descending.
+
+    The bidiagonal reduction of a large matrix waits for memory: root eigenvalues of its Gram matrix take a third of the
+    time, and are used where their rounding is below that of the rest.
+    """
+    if min(matrix.shape) >= LARGE:
+        wide = matrix if matrix.shape[0] <= matrix.shape[1] else matrix.T
+        roots, rounding = _root_eigenvalues(wide @ wide.T)
+        if rounding <= EXACT_TOLERANCE * trace:
+            return roots[::-1]
+    return np.asarray(np.linalg.svd(matrix, compute_uv=False), dtype=np.float64)
+
+
+def _root_eigenvalues(gram: FloatArray) -> tuple[FloatArray, float]:
+    """Root eigenvalues of a positive semi-definite matrix, ascending, and a bound on the rounding of their sum."""
+    eigenvalues = np.clip(np.linalg.eigvalsh(gram), 0.0, None)
+    roots = np.sqrt(eigenvalues)
+    slack = ROUNDING * float(eigenvalues[-1])
+    if slack == 0.0:
+        return roots, 0.0
+    return roots, float(np.sum(slack / (np.sqrt(eigenvalues + slack) + roots)))
 
 
 def _numerical_rank(singular: FloatArray, size: int) -> int:

@@ -80,6 +80,19 @@ def test_commuting_gaussians_closed_form(d: int, condition: float) -> None:
     assert abs(result.value - expected) <= 1e-13 * result.trace
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("condition", [1.0, 1e4, 1e10])
+def test_closed_form_where_the_gram_matrix_may_be_used(condition: float) -> None:
+    rng = np.random.default_rng(21)
+    scales = np.logspace(0.0, -0.5 * np.log10(condition), 1100)
+    x = with_exact_statistics(scales, np.zeros(1100), 1300, rng)
+    y = with_exact_statistics(scales[::-1], np.full(1100, 0.1), 1400, rng)
+    result = frechet_distance(x, y)
+    assert abs(result.value - (11.0 + np.sum((scales - scales[::-1]) ** 2))) <= 1e-13 * result.trace
+    itself = frechet_distance(x, x)
+    assert abs(itself.value) <= 1e-13 * itself.trace
+
+
 def test_fewer_samples_than_features() -> None:
     # Two orthonormal sets of 30 in 200 dimensions that share 10 directions: the cross term is known.
     rng = np.random.default_rng(3)
