@@ -131,7 +131,7 @@ def info(
 
     Example: stylebench data info bandai-namco=bandai.zip
     """
-    from bench.datasets import load_dataset
+    from bench.datasets.table import load_dataset
     from bench.suite.listing import dataset_table, describe_dataset
 
     [(dataset_name, path)] = _data_options([name]).items()

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from bench.adapters.loading import available_adapters
-from bench.datasets import DATASETS
+from bench.datasets.table import DATASETS
 from bench.datasets.base import Dataset
 from bench.datasets.split import PARTS, deal, leak
 from bench.errors import BadConfig

@@ -14,7 +14,7 @@ from typing import Any
 
 from bench.adapters import ADAPTERS
 from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
-from bench.datasets import load_dataset
+from bench.datasets.table import load_dataset
 from bench.errors import BadConfig
 from bench.protocols import PROTOCOLS
 from bench.protocols.base import Protocol

@@ -9,7 +9,7 @@ import pytest
 from bench.adapters import ADAPTERS
 from bench.adapters.base import Adapter
 from bench.adapters.oracles import Oracle
-from bench.datasets import DATASETS
+from bench.datasets.table import DATASETS
 from bench.metrics import METRICS
 from bench.metrics.catalogue import Metric
 from bench.protocols import PROTOCOLS
