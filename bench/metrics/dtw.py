@@ -1,9 +1,8 @@
 """Dynamic time warping of trajectories, exact and with path; FastDTW as the papers' named backend.
 
 Local cost is the Euclidean distance of two frames, steps are (1, 0), (0, 1) and (1, 1), every step weighs the same and
-the path runs from the first pair of frames to the last (Salvador and Chan 2007, section 2). Where
-predecessors cost the same, the exact backend goes back along the diagonal first, then up (one frame of ``a``), then left
-(one frame of ``b``).
+the path runs from the first pair of frames to the last (Salvador and Chan 2007, section 2). Where predecessors cost the
+same, the exact backend goes back along the diagonal first, then up (one frame of ``a``), then left (of ``b``).
 """
 
 from __future__ import annotations
