@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from bench.adapters.anchors import CopyContent, CopyStyle
+from bench.adapters.loading import find_adapter, source_from_option
+from bench.suite import keys
+
+ADAPTER = """
+from bench.adapters.base import Adapter
+from beside import SHIFT
+
+class Mine(Adapter):
+    name = "mine"
+
+    def transfer(self, content, style, *, rng):
+        return content.clip
+"""
+
+
+def digest_of_file(path: Path) -> str:
+    keys._file_digest.cache_clear()
+    keys._own_imports.cache_clear()
+    return keys.adapter_digest(find_adapter(source_from_option(str(path))))
+
+
+def test_digest_follows_the_file_and_what_lies_beside_it(tmp_path: Path) -> None:
+    adapter, beside = tmp_path / "mine.py", tmp_path / "beside.py"
+    adapter.write_text(ADAPTER)
+    beside.write_text("SHIFT = 1\n")
+    first = digest_of_file(adapter)
+    assert digest_of_file(adapter) == first
+    beside.write_text("SHIFT = 2\n")
+    second = digest_of_file(adapter)
+    assert second != first
+    adapter.write_text(ADAPTER + "\n# changed\n")
+    assert digest_of_file(adapter) != second
+
+
+def test_two_classes_of_one_file_differ() -> None:
+    assert keys.adapter_digest(CopyContent) != keys.adapter_digest(CopyStyle)
+
+
+def test_every_part_of_a_key_counts() -> None:
+    base = ("motions", "judges", "real", "tasks", "metric", 1)
+    variants = [(*base[:i], "other" if i < 5 else 2, *base[i + 1 :]) for i in range(6)]
+    found = {keys.score_key(*args) for args in [base, *variants]}  # type: ignore[arg-type]
+    assert len(found) == 7
