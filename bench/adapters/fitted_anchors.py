@@ -147,7 +147,9 @@ class ClassifyAndRetrieve(Anchor):
         self.scale = self.bank.descriptors.std(axis=0) + 1e-3
         model = LogisticRegression(C=0.01, max_iter=200)
         model.fit(self._standardised(self.bank.descriptors), [self.contents.index(c) for c in self.bank.contents])
-        self.weights = np.concatenate([model.coef_, model.intercept_[:, None]], axis=1)
+        weights = np.concatenate([model.coef_, model.intercept_[:, None]], axis=1)
+        # With two classes scikit-learn keeps one row, the log-odds of the second.
+        self.weights = np.concatenate([-weights, weights]) if len(self.contents) == 2 else weights
 
     def save(self, folder: Path) -> None:
         self.bank.save(folder)
