@@ -323,6 +323,8 @@ class _FastPath:
     def distance(self, counts: NDArray[np.int32]) -> float | None:
         """The distance with each generated row taken ``counts`` times; None where rounding would show."""
         rows = np.flatnonzero(counts)
+        if len(rows) <= self.mapped.shape[1]:
+            return None
         weights = counts[rows].astype(np.float64)
         n = weights.sum()
         shift = weights @ self.centred[rows] / n
