@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from classifiers.data import mean_rotations, one_hemisphere
 
@@ -110,8 +109,8 @@ class Autoencoder(nn.Module):
     def forward(self, rotations_wxyz: Tensor) -> Tensor:
         """Reconstruction ``[B, 24, V, 4]``, unit quaternions."""
         decoded: Tensor = self.decoder(self.encoder(rotations_wxyz).unsqueeze(-1))
-        raw = decoded.transpose(1, 2).reshape(rotations_wxyz.shape)
-        return functional.normalize(raw, dim=-1)
+        raw = decoded.view(len(decoded), self.config.n_joints, 4, self.config.n_frames).permute(0, 3, 1, 2)
+        return raw * raw.square().sum(dim=-1, keepdim=True).clamp_min(1e-12).rsqrt()
 
 
 def squared_half_angles(left_wxyz: Tensor, right_wxyz: Tensor) -> Tensor:

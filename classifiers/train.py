@@ -58,7 +58,7 @@ def seeded_single_thread(seed: int) -> Iterator[torch.Generator]:
     """Torch on one thread with its global generator seeded; both are put back. Yields a generator of its own."""
     threads = torch.get_num_threads()
     with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+        torch.default_generator.manual_seed(seed)
         torch.set_num_threads(1)
         try:
             yield torch.Generator().manual_seed(seed)
@@ -115,15 +115,17 @@ def train_autoencoder(
     with seeded_single_thread(seed) as generator:
         model = Autoencoder(network)
         model.encoder.fit_reference(windows)
-        clean = model.encoder.settle_signs(windows)
+        # time innermost in memory, as the convolutions want it: twice as fast as the order the axes have
+        clean = model.encoder.settle_signs(windows).permute(0, 2, 3, 1).contiguous()
 
         def loss(batch: Tensor) -> Tensor:
-            noise = training.noise * torch.randn(clean[batch].shape, generator=generator)
-            return squared_half_angles(model(clean[batch] + noise), clean[batch]).sum(dim=(1, 2)).mean()
+            target = clean[batch].permute(0, 3, 1, 2)
+            noise = training.noise * torch.randn(clean[batch].shape, generator=generator).permute(0, 3, 1, 2)
+            return squared_half_angles(model(target + noise), target).sum(dim=(1, 2)).mean()
 
         history = _descend(model, loss, len(clean), training, generator, progress)
         with torch.inference_mode():
-            model.encoder.fit_components(torch.cat([model.encoder(part) for part in torch.split(clean, 256)]))
+            model.encoder.fit_components(torch.cat([model.encoder(part) for part in torch.split(windows, 256)]))
     return model, history
 
 
@@ -149,7 +151,9 @@ def _descend(
     generator: torch.Generator,
     progress: Progress | None,
 ) -> History:
-    optimiser = torch.optim.AdamW(model.parameters(), lr=training.peak_rate, weight_decay=training.weight_decay)
+    optimiser = torch.optim.AdamW(
+        model.parameters(), lr=training.peak_rate, weight_decay=training.weight_decay, fused=True
+    )
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, max_lr=training.peak_rate, total_steps=training.n_steps, cycle_momentum=False
     )

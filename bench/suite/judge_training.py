@@ -39,8 +39,17 @@ STRIDE_FRAMES = 32
 CENTRE = slice(20, 44)
 """The 24 frames of a window that the auto-encoder reads."""
 
+
 CLASSIFIER_TRAINING = TrainingConfig(n_steps=200)
-AUTOENCODER_TRAINING = TrainingConfig(n_steps=1200, peak_rate=2e-3)
+AUTOENCODER_TRAINING = TrainingConfig(n_steps=1000, batch_size=32, peak_rate=4e-3)
+
+
+@dataclass(frozen=True)
+class JudgeRecipe:
+    """How judges are trained: the defaults are the canonical judges'."""
+
+    classifier: TrainingConfig = CLASSIFIER_TRAINING
+    autoencoder: TrainingConfig = AUTOENCODER_TRAINING
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,17 +67,23 @@ def centre_rotations(features: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def train_all(
-    dataset: Dataset, split: Split, seeds: Sequence[int], unseen: Sequence[Take], progress: ProgressCallback | None
+    dataset: Dataset,
+    split: Split,
+    seeds: Sequence[int],
+    recipe: JudgeRecipe,
+    *,
+    unseen: Sequence[Take] = (),
+    progress: ProgressCallback | None = None,
 ) -> Trained:
     """Train every judge on the split's judge part, measure it on the test and real parts; no gate."""
     parts = _Parts.of(dataset, split, unseen)
     classifiers: dict[str, tuple[Stgcn, ...]] = {}
     facts: list[ClassifierFacts] = []
     for target in _targets(dataset):
-        runs = [_train_classifier(parts, dataset, target, seed, progress) for seed in seeds]
+        runs = [_train_classifier(parts, dataset, target, seed, recipe, progress) for seed in seeds]
         classifiers[target] = tuple(model for model, _ in runs)
         facts += [_classifier_facts(*run, parts, target, seed) for run, seed in zip(runs, seeds, strict=True)]
-    coded = [_train_autoencoder(parts, seed, progress) for seed in seeds]
+    coded = [_train_autoencoder(parts, seed, recipe, progress) for seed in seeds]
     coder_facts = [_autoencoder_facts(*run, parts, seed) for run, seed in zip(coded, seeds, strict=True)]
     found = leak(dataset.takes, split)
     card = JudgeCard(
@@ -84,7 +99,12 @@ def train_all(
 
 
 def measure_split(
-    dataset: Dataset, split: Split, seeds: Sequence[int], progress: ProgressCallback | None = None
+    dataset: Dataset,
+    split: Split,
+    seeds: Sequence[int],
+    recipe: JudgeRecipe,
+    *,
+    progress: ProgressCallback | None = None,
 ) -> tuple[OtherSplit, ...]:
     """Accuracy of classifiers trained in the same way on another split; the networks are thrown away."""
     parts = _Parts.of(dataset, split, ())
@@ -92,7 +112,8 @@ def measure_split(
     rows = []
     for target in _targets(dataset):
         for seed in seeds:
-            facts = _classifier_facts(*_train_classifier(parts, dataset, target, seed, progress), parts, target, seed)
+            model, history = _train_classifier(parts, dataset, target, seed, recipe, progress)
+            facts = _classifier_facts(model, history, parts, target, seed)
             rows.append(OtherSplit(
                 kind=split.kind, target=target, seed=seed, accuracy=facts.pooled.accuracy,
                 balanced_accuracy=facts.pooled.balanced_accuracy, leak_share=_finite(found.share),
@@ -101,10 +122,12 @@ def measure_split(
     return tuple(rows)
 
 
-def train_again(dataset: Dataset, split: Split, known: ClassifierFacts, model: Stgcn, condition: str) -> Repeat:
+def train_again(
+    dataset: Dataset, split: Split, known: ClassifierFacts, model: Stgcn, recipe: JudgeRecipe, condition: str
+) -> Repeat:
     """Train one classifier once more and compare it with the first result."""
     parts = _Parts.of(dataset, split, ())
-    other, history = _train_classifier(parts, dataset, known.target, known.seed, None)
+    other, history = _train_classifier(parts, dataset, known.target, known.seed, recipe, None)
     facts = _classifier_facts(other, history, parts, known.target, known.seed)
     same = classify(other, parts.held_out).predicted == classify(model, parts.held_out).predicted
     return Repeat(
@@ -170,19 +193,21 @@ def _targets(dataset: Dataset) -> dict[str, tuple[str, ...]]:
 
 
 def _train_classifier(
-    parts: _Parts, dataset: Dataset, target: str, seed: int, progress: ProgressCallback | None
+    parts: _Parts, dataset: Dataset, target: str, seed: int, recipe: JudgeRecipe, progress: ProgressCallback | None
 ) -> tuple[Stgcn, History]:
     network = StgcnConfig(CANONICAL_PARENTS, len(_targets(dataset)[target]))
     step = _step_callback(progress, f"{target} judge {seed}")
     return train_classifier(
-        parts.judge.features, parts.judge.index[target], network, CLASSIFIER_TRAINING, seed=seed, progress=step
+        parts.judge.features, parts.judge.index[target], network, recipe.classifier, seed=seed, progress=step
     )
 
 
-def _train_autoencoder(parts: _Parts, seed: int, progress: ProgressCallback | None) -> tuple[Autoencoder, History]:
+def _train_autoencoder(
+    parts: _Parts, seed: int, recipe: JudgeRecipe, progress: ProgressCallback | None
+) -> tuple[Autoencoder, History]:
     rotations = centre_rotations(parts.judge.features)
     step = _step_callback(progress, f"auto-encoder {seed}")
-    return train_autoencoder(rotations, AutoencoderConfig(N_JOINTS), AUTOENCODER_TRAINING, seed=seed, progress=step)
+    return train_autoencoder(rotations, AutoencoderConfig(N_JOINTS), recipe.autoencoder, seed=seed, progress=step)
 
 
 def _classifier_facts(model: Stgcn, history: History, parts: _Parts, target: str, seed: int) -> ClassifierFacts:

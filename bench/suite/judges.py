@@ -25,7 +25,7 @@ from bench.errors import JudgeRefused
 from bench.motion.skeleton import N_JOINTS
 from bench.suite.embedding import Embedding
 from bench.suite.judge_card import JudgeCard, check_gate, to_markdown
-from bench.suite.judge_training import WINDOW_FRAMES, Trained, centre_rotations, train_all
+from bench.suite.judge_training import WINDOW_FRAMES, JudgeRecipe, Trained, centre_rotations, train_all
 from classifiers.autoencoder import Encoder
 from classifiers.checkpoint import BadCheckpoint, checkpoint_of, load_classifier, load_encoder, write_checkpoint
 from classifiers.embed import Classified, Encoded, classify, encode
@@ -35,6 +35,7 @@ from reports.records import JudgeFacts, write_text_atomically
 SEEDS = (0, 1, 2)
 PRETRAINED = Path(classifiers.__file__).parent / "pretrained"
 CARD_FILE = "card.json"
+CANONICAL_RECIPE = JudgeRecipe()
 
 Origin = Literal["canonical", "local"]
 Model = TypeVar("Model")
@@ -125,6 +126,7 @@ def train_judges(
     split: Split,
     *,
     seeds: Sequence[int] = SEEDS,
+    recipe: JudgeRecipe = CANONICAL_RECIPE,
     unseen: Sequence[Take] = (),
     progress: ProgressCallback | None = None,
 ) -> JudgeSet:
@@ -134,6 +136,7 @@ def train_judges(
     ----------
     dataset, split : the data; labels are the dataset's judged and native contents and its styles.
     seeds : one judge of every kind for each.
+    recipe : how long and how hard; the canonical judges' unless a test wants it quicker.
     unseen : takes of actors that no part holds, measured beside the rest.
     progress : called with what is being trained and the optimiser steps done.
 
@@ -142,7 +145,7 @@ def train_judges(
     JudgeRefused : a judge is too poor, see ``judge_card.check_gate``.
     BadData : a take without labels.
     """
-    trained = train_all(dataset, split, seeds, unseen, progress)
+    trained = train_all(dataset, split, seeds, recipe, unseen=unseen, progress=progress)
     check_gate(trained.card)
     return judge_set(trained)
 
