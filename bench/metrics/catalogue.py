@@ -36,8 +36,8 @@ class Metric:
 
 OURS = "this benchmark"
 PARK = "Park 2021, section 7"
-PUZZLE = "Motion Puzzle 2022, section 7.3"
-ERD = "Style-ERD 2022, section 4.3"
+PUZZLE = "Motion Puzzle 2022, section 7.2.2"
+ERD = "Style-ERD 2022, section 4.2"
 HEUSEL = "Heusel 2017, eq. 6"
 KERNEL = "Binkowski 2018, section 4"
 

@@ -4,7 +4,7 @@ Conventions: labels are integer indices ``[n]``; ``true`` is what was asked for,
 ``true`` comes first. The primary product is one value a sample (so that bootstraps can be made); numbers are means of
 those in percent.
 
-- ``correct``, ``top_k_correct``: CRA and SRA of the papers (Park 2021, section 5), one boolean a sample.
+- ``correct``, ``top_k_correct``: CRA and SRA of the papers (Park 2021, section 7), one boolean a sample.
 - ``joint_correct``: content and style both right on the same sample. The primary number.
 - ``kept_source_style``: still judged to have the source's style (source-style residue).
 - ``percent``: the mean of any of these.
