@@ -53,11 +53,13 @@ def fill(a: FloatArray, b_reversed: FloatArray) -> tuple[float, Directions]:
         left = last[low + 1 : low + 1 + length]
         total = current[low + 1 : low + 1 + length]
         direction = directions[diagonal // 4, low : low + length]
-        bit = 2 * (diagonal % 4)
+        not_corner = np.uint8(1 << (2 * (diagonal % 4)))
+        not_up = np.uint8(2 << (2 * (diagonal % 4)))
+        none = np.uint8(0)
         for q in range(length):
             side = min(up[q], left[q])
             total[q] = min(corner[q], side) + np.sqrt(local[q])
-            direction[q] |= ((corner[q] > side) | ((up[q] > left[q]) << 1)) << bit
+            direction[q] |= (not_corner if corner[q] > side else none) | (not_up if up[q] > left[q] else none)
         before_last, last, current = last, current, before_last
         current[0] = np.inf
     return float(last[n]), directions

@@ -55,6 +55,9 @@ def test_alignments(source: FloatArray) -> None:
     drifting = source + np.linspace(0.0, 1.0, 12)[:, None, None] * np.array([1.0, 0.0, 0.0])
     assert joint_displacement(source, drifting, 1.0, align="start").min() > 0.1
     assert joint_displacement(source, drifting, 1.0, align="root") == pytest.approx(np.zeros(21), abs=1e-20)
+    drifting[:, 5] += np.array([0.0, 0.0, 2.0])
+    wanted = np.where(np.arange(21) == 5, 2.0, 0.0)
+    assert joint_displacement(source, drifting, 1.0, squared=False, align="root") == pytest.approx(wanted, abs=1e-12)
     lifted = source + np.array([0.0, 2.0, 0.0])
     assert joint_displacement(source, lifted, 1.0, align="start") == pytest.approx(np.full(21, 4.0))
 
