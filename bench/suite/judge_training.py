@@ -16,7 +16,7 @@ from bench.datasets.split import Split, leak
 from bench.datasets.take import Take
 from bench.errors import BadData
 from bench.motion.edit import windows
-from bench.motion.representation import JUDGE_SLICES
+from bench.motion.representation import JUDGE_SLICES, window_frame
 from bench.motion.skeleton import CANONICAL_PARENTS, N_JOINTS
 from bench.suite.judge_card import (
     AutoencoderFacts,
@@ -27,7 +27,6 @@ from bench.suite.judge_card import (
     recognition,
     within_session,
 )
-from bench.suite.motions import Motions
 from classifiers.autoencoder import Autoencoder, AutoencoderConfig, Encoder
 from classifiers.checkpoint import checkpoint_of
 from classifiers.embed import classify, encode, reconstruction_angle_deg
@@ -146,15 +145,15 @@ class _Windows:
 
     @classmethod
     def of(cls, dataset: Dataset, takes: Sequence[Take]) -> _Windows:
-        pairs = [(take, part) for take in takes for _, part in windows(take.clip, WINDOW_FRAMES, STRIDE_FRAMES)]
-        features = Motions.of([take.with_clip(part) for take, part in pairs]).window_features()
-        judged = [dataset.judged_content.get(str(take.content)) for take, _ in pairs]
+        by_take = [_window_features(take) for take in takes]
+        owners = [take for take, own in zip(takes, by_take, strict=True) for _ in own]
+        judged = [dataset.judged_content.get(str(take.content)) for take in owners]
         index = {
             "content": _indices(dataset.content_labels, judged),
-            "style": _indices(dataset.style_labels, [take.style for take, _ in pairs]),
-            "native": _indices(dataset.native_content_labels, [take.content for take, _ in pairs]),
+            "style": _indices(dataset.style_labels, [take.style for take in owners]),
+            "native": _indices(dataset.native_content_labels, [take.content for take in owners]),
         }
-        return cls(features.astype(np.float32), index, [take.session for take, _ in pairs])
+        return cls(np.concatenate(by_take), index, [take.session for take in owners])
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +175,12 @@ class _Parts:
     @property
     def held_out(self) -> NDArray[np.float32]:
         return np.concatenate([self.test.features, self.real.features])
+
+
+def _window_features(take: Take) -> NDArray[np.float32]:
+    parts = [part for _, part in windows(take.clip, WINDOW_FRAMES, STRIDE_FRAMES)]
+    rotations, roots = (np.stack([getattr(part, name) for part in parts]) for name in ("rotations_wxyz", "root_xyz_m"))
+    return np.concatenate(window_frame(rotations, roots, take.clip.skeleton), axis=-1).astype(np.float32)
 
 
 def _indices(labels: tuple[str, ...], found: Sequence[str | None]) -> IntArray:

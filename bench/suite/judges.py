@@ -3,6 +3,8 @@
 Three seeds each of a content and a style ST-GCN, of a second content ST-GCN on the native labels where these were
 merged for judging, and of the denoising auto-encoder. *Canonical* judges come with this package and answer for one
 dataset digest and one split; all others are *local*.
+
+Maintainers make canonical judges with :mod:`bench.suite.make_judges`.
 """
 
 from __future__ import annotations
@@ -25,7 +27,13 @@ from bench.errors import JudgeRefused
 from bench.motion.skeleton import N_JOINTS
 from bench.suite.embedding import Embedding
 from bench.suite.judge_card import JudgeCard, check_gate, to_markdown
-from bench.suite.judge_training import WINDOW_FRAMES, JudgeRecipe, Trained, centre_rotations, train_all
+from bench.suite.judge_training import (
+    WINDOW_FRAMES,
+    JudgeRecipe,
+    Trained,
+    centre_rotations,
+    train_all,
+)
 from classifiers.autoencoder import Encoder
 from classifiers.checkpoint import BadCheckpoint, checkpoint_of, load_classifier, load_encoder, write_checkpoint
 from classifiers.embed import Classified, Encoded, classify, encode

@@ -1,0 +1,40 @@
+"""Canonical judges still say what they said when they were committed, on this machine too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.suite.judges import PRETRAINED, load_judges
+
+from .golden import FOLDER, WINDOWS_FILE, answers
+
+CANONICAL = sorted(path.parent for path in PRETRAINED.glob("*/card.json"))
+
+
+@pytest.mark.parametrize("folder", CANONICAL, ids=lambda folder: folder.name)
+def test_features_of_stored_windows(folder: Path) -> None:
+    judges = load_judges(folder, "canonical")
+    with np.load(WINDOWS_FILE, allow_pickle=False) as stored:
+        found = answers(judges, stored["features"])
+    with np.load(FOLDER / f"{folder.name}.npz", allow_pickle=False) as golden:
+        assert str(golden["digest"]) == judges.digest, (
+            "judges were trained anew: run python -m tests.classifiers.golden"
+        )
+        for name, array in found.items():
+            scale = np.abs(golden[name]).max()
+            assert np.abs(array - golden[name]).max() <= 1e-4 * scale, name
+
+
+@pytest.mark.parametrize("folder", CANONICAL, ids=lambda folder: folder.name)
+def test_canonical_judges_pass_their_bars(folder: Path) -> None:
+    card = load_judges(folder, "canonical").card
+    assert {judge.seed for judge in card.classifiers} == {judge.seed for judge in card.autoencoders} == {0, 1, 2}
+    assert all(judge.pooled.accuracy >= 95.0 for judge in card.of("content"))
+    assert all(judge.pooled.accuracy >= 97.0 for judge in card.of("style"))
+    assert all(judge.unseen_actor_accuracy is None or judge.unseen_actor_accuracy >= 95.0
+               for judge in (*card.of("content"), *card.of("style")))  # fmt: skip
+    assert card.licence and card.split_kind == "default"
+    assert all(path.stat().st_size < 2_000_000 for path in folder.iterdir())
