@@ -38,6 +38,7 @@ def test_monotonicity_by_hand() -> None:
     measured = monotonicity(WEIGHTS, odds)
     assert measured[:3] == pytest.approx([0.9, 1.0, -1.0])
     assert np.isnan(measured[3])
+    assert monotonicity([0.0, 0.5, 1.0], [[3.0, 1.0, 2.0]]) == pytest.approx([-0.5])
 
 
 def test_monotonicity_agrees_with_scipy_ties_included() -> None:
