@@ -43,6 +43,11 @@ def test_rotation_errors_ignore_signs_order_and_a_common_turn(rng: np.random.Gen
     assert np.all(rotation_errors_deg(true, true) == 0.0)
 
 
+def test_rounding_of_quaternion_lengths_is_no_error(rng: np.random.Generator) -> None:
+    true = rotations((5, 3), rng)
+    assert rotation_errors_deg(true, 1.0005 * true) == pytest.approx(np.zeros((5, 3)), abs=1e-9)
+
+
 def test_position_errors_by_hand() -> None:
     true, output = np.zeros((1, 2, 3)), np.zeros((1, 2, 3))
     output[0, 1] = 0.03, 0.0, 0.04
@@ -62,19 +67,20 @@ def test_the_true_answer_has_no_error(rng: np.random.Generator) -> None:
 
 
 def test_all_four_errors_by_hand() -> None:
-    """One joint. True places 0, 0, 1 m, output 0, 1, 1 m; the path pairs 0-0, 1-0, 2-1, 2-2 at no cost.
+    """One joint. True places 0, 0, 1 m, output 0, 1, 1 m and 2 cm higher; the path pairs 0-0, 1-0, 2-1, 2-2.
 
-    Frame by frame only the second frame is 1 m off. True turns 0, 10, 0 degrees, output 0, 0, 30: exact
+    Frame by frame the second frame is 1 m off besides. True turns 0, 10, 0 degrees, output 0, 0, 30: exact
     (0 + 10 + 30) / 3, along the path (0 + 10 + 0 + 30) / 4.
     """
     true_places, output_places = np.zeros((3, 1, 3)), np.zeros((3, 1, 3))
     true_places[2, 0, 0] = output_places[1:, 0, 0] = 1.0
+    output_places[:, 0, 1] = 0.02
     true_turns = about_y(np.radians([[0.0], [10.0], [0.0]]))
     output_turns = about_y(np.radians([[0.0], [0.0], [30.0]]))
     errors = paired_errors(true_turns, output_turns, true_places, output_places)
-    assert errors.position_cm == pytest.approx(100.0 / 3.0)
+    assert errors.position_cm == pytest.approx((2.0 + 100.02 + 2.0) / 3.0, rel=1e-6)
     assert errors.rotation_deg == pytest.approx(40.0 / 3.0)
-    assert errors.aligned_position_cm == 0.0
+    assert errors.aligned_position_cm == pytest.approx(2.0)
     assert errors.aligned_rotation_deg == pytest.approx(10.0)
 
 

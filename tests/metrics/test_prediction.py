@@ -29,6 +29,7 @@ def test_statistics_by_hand() -> None:
     assert statistics.mean.tolist() == [2.0, 7.0]
     assert statistics.std.tolist() == [1.0, 0.0]
     assert statistics.varies.tolist() == [True, False]
+    assert feature_statistics([[0.0, 0.0], [2.0, 4.0]], min_std=1.0).varies.tolist() == [False, True]
 
 
 def test_a_perfect_prediction_has_no_error(rng: np.random.Generator) -> None:
@@ -69,6 +70,7 @@ def test_mean_pose_on_the_fit_part_has_error_one(rng: np.random.Generator) -> No
 
 
 def test_baselines_by_hand() -> None:
+    assert mean_pose_prediction(STATISTICS, 1).tolist() == [[1.0, 5.0]]
     assert mean_pose_prediction(STATISTICS, 2).tolist() == [[1.0, 5.0], [1.0, 5.0]]
     assert repeat_last_prediction([[1.0, 2.0], [3.0, 4.0]], 2).tolist() == [[3.0, 4.0], [3.0, 4.0]]
 
