@@ -30,7 +30,8 @@ def checked_features(features: NDArray[np.floating], shape: tuple[int, ...]) -> 
         raise BadArray(f"features must have shape [n, {', '.join(map(str, shape))}], got {list(array.shape)}")
     if not np.isfinite(array).all():
         raise BadArray(f"features must be finite, got {int((~np.isfinite(array)).sum())} NaN or Inf")
-    return torch.as_tensor(np.ascontiguousarray(array, dtype=np.float32))
+    # a copy: torch warns about arrays that may not be written to
+    return torch.from_numpy(np.array(array, dtype=np.float32, order="C"))
 
 
 def checked_labels(labels: NDArray[np.integer], n_samples: int, n_classes: int) -> Tensor:

@@ -61,6 +61,13 @@ def test_features_of_another_shape_are_refused(shape: tuple[int, ...]) -> None:
         checked_features(np.zeros(shape), (8, 3, 7))
 
 
+def test_read_only_features_are_taken() -> None:
+    features = np.zeros((2, 8, 3, 7))
+    features.flags.writeable = False
+    checked_features(features, (8, 3, 7))[0] = 1.0
+    assert not features.any()
+
+
 def test_nan_is_refused() -> None:
     features = np.zeros((2, 8, 3, 7))
     features[1, 2, 0, 0] = np.nan
