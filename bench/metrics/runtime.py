@@ -1,4 +1,4 @@
-"""Statistics of measured durations (Style-ERD, Table 2; Mason 2022, Table 2; Kuriyama 2022, section 4).
+"""Statistics of measured durations (Style-ERD, Table 2; Mason 2022, Table 2; Kuriyama 2022, section 3).
 
 Nothing is timed here: durations come in as arrays of seconds, one for each call, warm-up calls already taken out.
 """
