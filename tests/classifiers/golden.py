@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.datasets.table import load_dataset
 from bench.motion.edit import windows
 from bench.motion.representation import judge_features
 from bench.suite.judges import PRETRAINED, JudgeSet, load_judges
@@ -33,6 +32,8 @@ def answers(judges: JudgeSet, features: NDArray[np.floating]) -> dict[str, NDArr
 
 def write_windows() -> None:
     """Windows of takes spread over the procedural dataset, as judge features ``[4, 64, 21, 7]``."""
+    from bench.datasets.table import load_dataset
+
     takes = load_dataset("procedural", None).takes
     chosen = [takes[(2 * i + 1) * len(takes) // (2 * N_WINDOWS)] for i in range(N_WINDOWS)]
     features = np.stack([judge_features(windows(take.clip)[0][1]) for take in chosen]).astype(np.float32)
