@@ -56,7 +56,7 @@ def run(
     methods: Annotated[str, typer.Option(help="Comma-separated names; default: all anchor rows.")] = "",
     adapter: Annotated[list[str] | None, typer.Option(help="Your adapter, FILE.py or FILE.py:Class.")] = None,
     tracks: Annotated[str, typer.Option(help="Comma-separated tracks.")] = "transfer",
-    profile: Annotated[str, typer.Option(help="quick (1000 samples) or standard (2500).")] = "quick",
+    profile: Annotated[str, typer.Option(help="smoke, quick (1000 samples) or standard (2500).")] = "quick",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<time>, and runs/latest.")] = None,
     store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
     jobs: Annotated[int, typer.Option(min=1, help="Cells at a time.")] = 2,

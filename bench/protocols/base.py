@@ -21,6 +21,9 @@ class Task:
     style_take_id : the style reference, handed over whole.
     content, source_style, target_style : judged labels; the source's and the wanted ones.
     seed : seeds the generator that the method is given.
+    part : body part to be changed, in tracks that change parts; empty elsewhere.
+    weight : share of the target style, in the interpolation track; 1 elsewhere.
+    start_take_id : the style that interpolation starts from; empty is the source itself.
     """
 
     sample_id: str
@@ -32,6 +35,9 @@ class Task:
     target_style: str
     reference_content: str
     seed: int
+    part: str = ""
+    weight: float = 1.0
+    start_take_id: str = ""
 
     @property
     def same_content(self) -> bool:

@@ -92,7 +92,7 @@ TRANSFER = Protocol(
     needs="transfers",
     window_frames=WINDOW_FRAMES,
     fps=30.0,
-    n_samples={"quick": 1000, "standard": 2500},
+    n_samples={"smoke": 60, "quick": 1000, "standard": 2500},
     metrics=(
         "joint_recognition",
         "joint_recognition_ratio",
