@@ -53,7 +53,19 @@ def test_small_whole_numbers_give_the_brute_force_path_ties_included(data: st.Da
 
 
 @pytest.mark.parametrize(
-    "shape", [(1, 1, 6), (1, 9, 6), (9, 1, 6), (40, 33, 6), (17, 70, 1), (25, 25, 7), (30, 90, 63)]
+    "shape",
+    [
+        (1, 1, 6),
+        (1, 9, 6),
+        (9, 1, 6),
+        (40, 33, 6),
+        (17, 70, 1),
+        (25, 25, 7),
+        (30, 90, 63),
+        (128, 40, 6),
+        (129, 131, 6),
+        (300, 140, 2),
+    ],
 )
 def test_random_trajectories_give_the_brute_force_path(shape: tuple[int, int, int]) -> None:
     n, m, k = shape
