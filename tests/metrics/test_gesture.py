@@ -222,7 +222,7 @@ def test_refuses_one_frame_where_a_spread_is_needed() -> None:
 
 @pytest.mark.parametrize("fps", [0.0, -60.0, float("nan"), float("inf")])
 def test_refuses_a_frame_rate_that_is_none(fps: float) -> None:
-    with pytest.raises(BadInput, match="fps"):
+    with pytest.raises(BadInput, match=r"^fps:"):
         style_error_components(GOOD, GOOD, fps)
 
 
