@@ -115,6 +115,7 @@ def test_middle_content_by_hand() -> None:
     """Three of the four outputs between the ends."""
     assert middle_content_percent(SEEN_CONTENTS, CONTENTS) == 75.0
     assert middle_content_percent([[9, 0, 0, 9], [9, 1, 1, 9]], CONTENTS) == 100.0
+    assert middle_content_percent([[0, 0, 0], [1, 0, 1]], CONTENTS) == 50.0
 
 
 def test_recognition_ignores_the_order_of_samples() -> None:

@@ -123,6 +123,13 @@ def test_refuses_what_are_no_rotations(bad: FloatArray) -> None:
             function(TURNS, bad)
 
 
+def test_refuses_a_single_bad_quaternion() -> None:
+    bad = TURNS.copy()
+    bad[2, 1] *= 1.1
+    with pytest.raises(BadInput, match="output_rotations_wxyz"):
+        rotation_errors_deg(TURNS, bad)
+
+
 @pytest.mark.parametrize("bad", [PLACES[:0], PLACES[0], np.full((4, 2, 3), np.nan), np.zeros((4, 2, 2))])
 def test_refuses_what_are_no_positions(bad: FloatArray) -> None:
     for function in (position_errors_cm, lambda a, b: paired_errors(TURNS, TURNS, a, b)):
