@@ -7,9 +7,9 @@ from collections import Counter
 import numpy as np
 
 from bench.adapters.loading import available_adapters
-from bench.datasets.table import DATASETS
 from bench.datasets.base import Dataset
 from bench.datasets.split import PARTS, deal, leak
+from bench.datasets.table import DATASETS
 from bench.errors import BadConfig
 from bench.metrics import METRICS
 from bench.protocols import PROTOCOLS

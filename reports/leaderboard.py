@@ -1,0 +1,165 @@
+"""``leaderboard.md`` from published records: the same records give the same bytes."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+
+from tabulate import tabulate
+
+from reports.formatting import UNDEFINED, count, duration, escape_markdown, number, one_line
+from reports.records import Record
+from reports.render import environment, to_markdown
+from reports.rows import StoredRecord, groups, load_run
+from reports.tables import Column, Table, TableRow, build_table
+from reports.verdicts import sentences
+
+MAX_DIFF_LINES = 40
+
+
+def render_leaderboard(records_folder: Path) -> str:
+    """The whole page as Markdown, from the records and samples files under ``records_folder``.
+
+    Records judged by local judges are left out and named. No time, host or path enters but those in the records.
+
+    Raises
+    ------
+    BadRecord : a record or samples file is broken, or records must not stand in one table.
+    """
+    stored = load_run(records_folder)
+    canonical = [item for item in stored if not _is_local(item.record)]
+    sections = [_section(build_table(key, items), items) for key, items in groups(canonical).items()]
+    template = environment().get_template("leaderboard.md")
+    return template.render(sections=sections, left_out=_left_out(stored)).rstrip() + "\n"
+
+
+def check(path: Path, records_folder: Path) -> str:
+    """Empty if ``path`` holds exactly what the records give, else what differs, in at most 40 lines of diff."""
+    wanted = render_leaderboard(records_folder)
+    if not path.is_file():
+        return f"{path}: missing; write it with `stylebench leaderboard`"
+    found = path.read_text(encoding="utf-8")
+    if found == wanted:
+        return ""
+    lines = list(
+        difflib.unified_diff(found.splitlines(), wanted.splitlines(), path.name, "from the records", lineterm="", n=1)
+    )
+    more = [f"... {len(lines) - MAX_DIFF_LINES} more lines"] if len(lines) > MAX_DIFF_LINES else []
+    head = f"{path}: differs from what the records give; write it again with `stylebench leaderboard`"
+    return "\n".join([head, *lines[:MAX_DIFF_LINES], *more])
+
+
+def _is_local(record: Record) -> bool:
+    return any(judge.origin == "local" for judge in record.judges)
+
+
+def _left_out(stored: Sequence[StoredRecord]) -> list[str]:
+    names = {(record.method.title, record.dataset) for record, _ in stored if _is_local(record)}
+    return [f"{escape_markdown(title)} on {escape_markdown(dataset)}" for title, dataset in sorted(names)]
+
+
+def _section(table: Table, stored: Sequence[StoredRecord]) -> dict[str, object]:
+    return {
+        "title": escape_markdown(table.title),
+        "overview": sentences(table),
+        "cost": _cost(table),
+        "facts": _facts(table),
+        "main": to_markdown(table, "main").rstrip(),
+        "details": to_markdown(table, "details").rstrip() if table.columns_of("details") else "",
+        "judges": _judge_cards(table),
+        "anchors": _anchor_meanings(table),
+        "runs": _runs(stored),
+    }
+
+
+def _pipe(headers: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    return tabulate(lines, headers=headers, tablefmt="pipe", disable_numparse=True) if lines else ""
+
+
+def _cost(table: Table) -> str:
+    """What each method took to train, run and score; empty without methods."""
+    rows = [row for row in table.rows if row.row.method.kind == "method"]
+    column = table.primary
+    headers = ["rank", "method", column.header if column else "", "parameters", "run", "memory", "needs", "trained on"]
+    return _pipe(headers, [_cost_line(row, column) for row in rows])
+
+
+def _cost_line(row: TableRow, column: Column | None) -> list[str]:
+    facts = row.row.method
+    found = row.estimates.get(column.key) if column else None
+    value = UNDEFINED if column is None or found is None or found.value is None else number(found.value, column.unit)
+    needs = [words for words in row.marks if words.startswith(("needs", "uses"))]
+    provenance = [record.provenance for record, _ in row.row.stored]
+    return [
+        UNDEFINED if row.rank is None else str(row.rank),
+        escape_markdown(row.title) + (" (copies)" if row.row.copies else ""),
+        row.row.status if row.section == "unfinished" else value,
+        UNDEFINED if facts.parameters is None else count(facts.parameters),
+        duration(sum(item.wall_s for item in provenance)),
+        f"{max(item.peak_rss_mb for item in provenance) / 1000.0:.1f} GB",
+        ", ".join(words.removeprefix("needs ") for words in needs),
+        escape_markdown(facts.trained_on),
+    ]
+
+
+def _facts(table: Table) -> list[str]:
+    """What a reader needs to rebuild the numbers, as Markdown list items."""
+    column = table.primary
+    items = []
+    if column is not None and table.n is not None:
+        items.append(f"n: {table.n} samples behind {column.title} ({column.slice.replace('_', ' ')})")
+    names = ["licence", "citation", *(name for name in table.facts if name not in ("licence", "citation"))]
+    items += [
+        f"{name.replace('_', ' ')}: {escape_markdown(table.facts[name])}" for name in names if name in table.facts
+    ]
+    return items
+
+
+def _judge_cards(table: Table) -> str:
+    def percent(value: float | None) -> str:
+        return UNDEFINED if value is None else number(value, "%")
+
+    lines = [
+        [
+            escape_markdown(judge.id),
+            percent(judge.real_accuracy),
+            percent(judge.chance),
+            percent(judge.majority_rate),
+            judge.origin,
+            f"`{judge.digest}`",
+        ]
+        for judge in table.judges
+    ]
+    return _pipe(["judge", "accuracy on real, %", "chance, %", "commonest class, %", "origin", "digest"], lines)
+
+
+def _anchor_meanings(table: Table) -> str:
+    lines = [
+        [escape_markdown(row.title), escape_markdown(row.row.method.description), escape_markdown(_source(row))]
+        for row in table.rows
+        if row.row.method.kind == "anchor"
+    ]
+    return _pipe(["row", "what it is", "draws from"], lines)
+
+
+def _source(row: TableRow) -> str:
+    return row.row.method.draws_from or UNDEFINED
+
+
+def _runs(stored: Sequence[StoredRecord]) -> list[str]:
+    """One list item per distinct command, commit and machine, with what it took."""
+    found: dict[tuple[str, ...], list[Record]] = {}
+    for record, _ in stored:
+        made = record.provenance
+        commit = made.commit[:12] + (" with uncommitted changes" if made.dirty else "")
+        machine = f"{made.gpu or made.cpu}, {made.threads} thread{'s' if made.threads != 1 else ''}"
+        found.setdefault((one_line(made.command), commit, machine), []).append(record)
+    items = []
+    for (command, commit, machine), records in sorted(found.items()):
+        wall = duration(sum(record.provenance.wall_s for record in records))
+        days = sorted({record.provenance.time_utc[:10] for record in records})
+        span = days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
+        cells = f"{len(records)} cell{'s' if len(records) != 1 else ''}"
+        items.append(f"`{command}`<br>commit {commit}; {escape_markdown(machine)}; {cells} in {wall}; {span}")
+    return items

@@ -1,0 +1,138 @@
+"""What the first screen says of a table: who leads, who really transfers style, who copies, what a trick can do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from reports.aggregate import SIGNIFICANCE, paired_difference
+from reports.formatting import escape_markdown, number
+from reports.significance import holm
+from reports.tables import Column, Table, TableRow
+
+CEILING_ROWS = ("real-test", "real-disjoint", "label-oracle", "procedural-truth")
+"""Anchors made of true answers; also with a suffix: ``real-test+park-ik``."""
+NOTHING_ROWS = ("copy-content", "copy-style", "coin-flip", "mean-pose", "frozen-frame", "noise")
+"""Anchors that do not even try; also with a suffix: ``noise-0.1``."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Names of rows of one table, best first."""
+
+    leaders: tuple[TableRow, ...]
+    """methods of rank 1"""
+    transfers: tuple[TableRow, ...]
+    """ranked methods separably better than every row that does nothing"""
+    does_nothing: tuple[TableRow, ...]
+    """ranked methods that are not"""
+    below_trick: tuple[TableRow, ...]
+    """ranked methods that are not separably better than the best simple trick"""
+    trick: TableRow | None
+    """the best anchor that neither is real motion nor does nothing nor copies"""
+    copying_methods: tuple[TableRow, ...]
+    copying_anchors: tuple[TableRow, ...]
+
+
+def is_one_of(name: str, families: Sequence[str]) -> bool:
+    """Whether an anchor's name is one of the families, alone or with a suffix after ``-`` or ``+``."""
+    return any(name == family or name.startswith((f"{family}-", f"{family}+")) for family in families)
+
+
+def verdict_of(table: Table) -> Verdict:
+    """Judge the ranked methods of a table on its primary column.
+
+    Differences are paired and Holm-corrected over all comparisons of one kind. Without replicates of both rows a
+    method counts as not separable.
+    """
+    ranked = [row for row in table.of("methods") if row.rank is not None]
+    anchors = [row for row in table.of("anchors") if row.row.method.kind == "anchor"]
+    nothing = [row for row in anchors if is_one_of(row.row.method.name, NOTHING_ROWS)]
+    tricks = [
+        row
+        for row in anchors
+        if not row.row.copies and not is_one_of(row.row.method.name, (*NOTHING_ROWS, *CEILING_ROWS))
+    ]
+    above_nothing = _better_than_all(table.primary, ranked, nothing)
+    above_trick = _better_than_all(table.primary, ranked, tricks[:1])
+    return Verdict(
+        leaders=tuple(row for row in ranked if row.rank == 1),
+        transfers=tuple(row for row in ranked if row in above_nothing),
+        does_nothing=tuple(row for row in ranked if row not in above_nothing),
+        below_trick=tuple(row for row in ranked if row not in above_trick) if tricks else (),
+        trick=tricks[0] if tricks else None,
+        copying_methods=tuple(row for row in table.of("anchors") if row.row.method.kind == "method"),
+        copying_anchors=tuple(row for row in anchors if row.row.copies),
+    )
+
+
+def _better_than_all(
+    column: Column | None, rows: Sequence[TableRow], rivals: Sequence[TableRow]
+) -> tuple[TableRow, ...]:
+    """Rows separably better than each rival, after Holm's correction over all rows x rivals."""
+    if column is None or not rows:
+        return ()
+    sign = -1.0 if column.better == "lower" else 1.0
+    pairs = [(row, rival) for row in rows for rival in rivals]
+    found = [paired_difference(row.row, rival.row, column.metric, column.slice) for row, rival in pairs]
+    adjusted = holm([1.0 if difference is None else difference.p for difference in found])
+    beaten = {
+        (row.row.method.name, rival.row.method.name)
+        for (row, rival), difference, p in zip(pairs, found, adjusted, strict=True)
+        if difference is not None and p < SIGNIFICANCE and sign * difference.value > 0.0
+    }
+    return tuple(row for row in rows if all((row.row.method.name, r.row.method.name) in beaten for r in rivals))
+
+
+def sentences(table: Table) -> list[str]:
+    """The verdict as Markdown sentences, one fact each."""
+    column = table.primary
+    if column is None:
+        return ["No row of this table has finished."]
+    verdict = verdict_of(table)
+    said = [_leading(table, column, verdict)]
+    if verdict.transfers:
+        said.append(f"**Really transfer style** (separably above every do-nothing row): {_names(verdict.transfers)}.")
+    if verdict.does_nothing:
+        said.append(f"**Not separable from doing nothing:** {_names(verdict.does_nothing)}.")
+    if verdict.trick is not None and verdict.below_trick:
+        trick = f"{escape_markdown(verdict.trick.title)} ({_value(column, verdict.trick)})"
+        said.append(f"**Not better than a simple trick**, {trick}: {_names(verdict.below_trick)}.")
+    if verdict.copying_methods:
+        said.append(f"**Only copy** (no rank, whatever they score): {_names(verdict.copying_methods)}.")
+    said.append(_scale(table, column))
+    return [sentence for sentence in said if sentence]
+
+
+def _leading(table: Table, column: Column, verdict: Verdict) -> str:
+    if not verdict.leaders:
+        return "No method is ranked in this table yet; its anchor rows show what the numbers mean."
+    tie = " (a tie: not separable on these samples)" if len(verdict.leaders) > 1 else ""
+    values = ", ".join(f"{escape_markdown(row.title)} {_value(column, row)}" for row in verdict.leaders)
+    return f"**Leads** on {column.title}{tie}: {values}."
+
+
+def _scale(table: Table, column: Column) -> str:
+    """Where real motion, the best trick and the best do-nothing row stand on the primary column."""
+    anchors = table.of("anchors")
+    families = (("real motion", CEILING_ROWS[:2]), ("the best do-nothing row", NOTHING_ROWS))
+    parts = []
+    for words, names in families:
+        found = [row for row in anchors if is_one_of(row.row.method.name, names)]
+        if found:
+            parts.append(f"{words} ({escape_markdown(found[0].title)}) {_value(column, found[0])}")
+    trick = verdict_of(table).trick
+    if trick is not None:
+        parts.insert(1, f"the best simple trick ({escape_markdown(trick.title)}) {_value(column, trick)}")
+    return f"**Scale** of {column.title}: {', '.join(parts)}." if parts else ""
+
+
+def _names(rows: Sequence[TableRow]) -> str:
+    return ", ".join(escape_markdown(row.title) for row in rows)
+
+
+def _value(column: Column, row: TableRow) -> str:
+    found = row.estimates.get(column.key)
+    if found is None or found.value is None:
+        return "undefined"
+    return number(found.value, column.unit) + (" %" if column.unit == "%" else "")
