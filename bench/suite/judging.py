@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bench.datasets.base import Dataset, ProgressCallback
@@ -52,5 +52,5 @@ def judges_for(
 
 
 def embed(judges: JudgeSet, motions: Motions) -> Embedding:
-    """What all judges say about a set of motions."""
-    return judges.evaluate(motions.window_features()).embedding
+    """What all judges say about a set of motions; native-label judges only serve the judge card."""
+    return replace(judges, native=()).evaluate(motions.window_features()).embedding

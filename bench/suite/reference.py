@@ -20,6 +20,7 @@ from bench.suite.copying import DescriptorBank
 from bench.suite.embedding import Embedding
 from bench.suite.motions import Motions
 from bench.suite.scores.base import Labelled, Reference
+from bench.suite.scores.distances import floors
 from bench.suite.setting import Setting
 from reports.bootstrap import cluster_counts
 from reports.records import digest_of
@@ -71,7 +72,16 @@ def build_reference(setting: Setting, embed: Embed, folder: Path) -> dict[str, A
         np.savez(folder / f"{name}.npz", descriptors=bank.descriptors, take_index=bank.take_index,
                  take_ids=np.array(bank.take_ids))  # fmt: skip
     np.save(folder / "real_jerk.npy", jerk)
-    return {"copy_threshold": threshold, "n_real": real.n, "n_seeds": judge_part.n_seeds}
+    facts: dict[str, Any] = {"copy_threshold": threshold, "n_seeds": judge_part.n_seeds, "floors": {}}
+    whole = load_reference(
+        folder,
+        facts,
+        tasks=setting.tasks,
+        content_labels=setting.dataset.content_labels,
+        style_labels=setting.dataset.style_labels,
+        protocol_id=setting.protocol.protocol_id,
+    )
+    return facts | {"floors": floors(whole)}
 
 
 def load_reference(
@@ -105,6 +115,7 @@ def load_reference(
         test_bank=_bank(folder / "test_bank.npz"),
         copy_threshold=float(facts["copy_threshold"]),
         real_jerk=np.load(folder / "real_jerk.npy", allow_pickle=False),
+        floors=facts["floors"],
         counts=cluster_counts(clusters, seed=stable_seed("bootstrap", protocol_id)),
     )
 

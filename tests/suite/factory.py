@@ -15,11 +15,13 @@ from bench.suite.embedding import Embedding
 from bench.suite.motions import Motions
 from bench.suite.reference import label_indices
 from bench.suite.scores.base import Labelled, Reference, Row
+from bench.suite.scores.distances import SET_FEATURES
 from reports.bootstrap import cluster_counts
 from tests.motion.factory import random_clip
 
 CONTENTS, STYLES = ("run", "walk"), ("angry", "old", "proud")
 N_SEEDS, N_TASKS = 2, 90
+FLOORS = {name: 0.01 for name in (*SET_FEATURES, "conditional_kid", "conditional_fmd")}
 
 
 def toy_takes(first_seed: int) -> list[Take]:
@@ -73,6 +75,7 @@ def reference() -> Reference:
         test_bank=DescriptorBank.of(test, 1),
         copy_threshold=0.01,
         real_jerk=np.full(120, 50.0),
+        floors=FLOORS,
         counts=cluster_counts(np.array([task.content_take_id for task in tasks]), 50, seed=0),
     )
 

@@ -22,14 +22,10 @@ SCORES: dict[str, Score] = {
     "sra": recognition.sra,
     "sra_balanced": recognition.sra_balanced,
     "source_style_residue": recognition.source_style_residue,
-    "fmd[stgcn-content]": partial(distances.set_distance, "fmd[stgcn-content]", "content_features"),
-    "fmd[stgcn-style]": partial(distances.set_distance, "fmd[stgcn-style]", "style_features"),
-    "fmd[dae]": partial(distances.set_distance, "fmd[dae]", "autoencoder_components"),
-    "kid[stgcn-content]": partial(distances.set_distance, "kid[stgcn-content]", "content_features"),
-    "kid[stgcn-style]": partial(distances.set_distance, "kid[stgcn-style]", "style_features"),
     "jerk_ratio": motion.jerk_ratio,
     "jerk_ratio_worst_content": motion.jerk_ratio_worst_content,
     "time_correlation": motion.time_correlation,
     "bone_drift": motion.bone_drift,
+    **{name: partial(distances.set_distance, name, features) for name, features in distances.SET_FEATURES.items()},
 }
 """Metric name -> how the transfer track computes it."""

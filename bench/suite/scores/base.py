@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -44,6 +44,7 @@ class Reference:
     fit_bank, test_bank : descriptors of motion that methods were given.
     copy_threshold : distance below which an output is a copy.
     real_jerk : jerk ``[m]`` of the windows of the real part, m/s^3.
+    floors : metric name -> the distance of ``floor`` from ``real``.
     counts : ``[B, n]`` bootstrap counts shared by all rows.
     """
 
@@ -58,6 +59,7 @@ class Reference:
     test_bank: DescriptorBank
     copy_threshold: float
     real_jerk: FloatArray
+    floors: Mapping[str, float]
     counts: NDArray[np.int32]
 
     @cached_property

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +9,8 @@ from bench.arrays import BoolArray, FloatArray
 from bench.metrics import frechet, kernel
 from bench.metrics.conditional import MIN_REAL
 from bench.suite.scores.base import PRIMARY_SLICE, Labelled, Reference, Row, Scored, measure
-from reports.records import Measurement
+
+SIDES = ("style", "content")
 
 
 def conditional_kid(row: Row, reference: Reference) -> Scored:
@@ -53,15 +52,14 @@ def _conditional(name: str, row: Row, reference: Reference, form: _Kid | _Fmd) -
     for slice_name in (PRIMARY_SLICE, "all"):
         mask = reference.slices[slice_name]
         counts = reference.counts[:, mask]
-        sides = {kind: _sides(kind, generated, reference, form, mask, counts) for kind in ("style", "content")}
+        sides = {kind: _sides(kind, generated, reference, form, mask, counts) for kind in SIDES}
         values = np.maximum(sides["style"][0], sides["content"][0])
         draws = np.maximum(sides["style"][1], sides["content"][1]).mean(axis=0)
-        floors = [_sides(kind, reference.floor, reference, form, None, None)[0] for kind in ("style", "content")]
         replicates[f"{name}|{slice_name}"] = draws
         measurements.append(
             measure(
                 name, slice_name, float(values.mean()), int(mask.sum()), replicates=draws,
-                judge_values=values.tolist(), floor=float(np.maximum(floors[0], floors[1]).mean()),
+                judge_values=values.tolist(), floor=reference.floors[name],
                 details={"style": float(sides["style"][0].mean()), "content": float(sides["content"][0].mean())},
                 reason=_left_out(reference),
             )
@@ -106,41 +104,46 @@ def set_distance(name: str, features: str, row: Row, reference: Reference) -> Sc
     """FMD or KID of whole feature sets (a field of ``Embedding``), mean over judge seeds."""
     exact = _frechet if name.startswith("fmd") else kernel.kernel_distance
     resample = frechet.frechet_replicates if name.startswith("fmd") else kernel.kernel_replicates
-    real, generated, floor = (
-        getattr(embedding, features).astype(np.float64)
-        for embedding in (reference.real.embedding, row.embedding, reference.floor.embedding)
+    real, generated = (
+        getattr(embedding, features).astype(np.float64) for embedding in (reference.real.embedding, row.embedding)
     )
     seeds = range(len(real))
-    floor_value = float(np.mean([exact(real[s], floor[s]) for s in seeds]))
-    measurements, replicates = [], {}
-    for slice_name in ("all", PRIMARY_SLICE):
-        mask = reference.slices[slice_name]
-        values = [exact(real[s], generated[s, mask]) for s in seeds]
-        draws = np.mean([resample(real[s], generated[s, mask], reference.counts[:, mask]) for s in seeds], axis=0)
-        replicates[f"{name}|{slice_name}"] = draws
-        details = {"n_real": float(real.shape[1]), "d": float(real.shape[2])}
-        measurements.append(_shown_set_distance(name, slice_name, values, draws, floor_value, details, int(mask.sum())))
-    return Scored(tuple(measurements), {}, replicates)
+    details = {"n_real": float(real.shape[1]), "d": float(real.shape[2])}
+    fewest, needed = min(real.shape[1], generated.shape[1]), 2 * real.shape[2]
+    if name.startswith("fmd") and fewest < needed:
+        reason = f"n = {fewest} is below 2 d = {needed}: the number would be mostly bias"
+        return Scored((measure(name, "all", float("nan"), generated.shape[1], details=details, reason=reason),))
+    values = [exact(real[s], generated[s]) for s in seeds]
+    draws = np.mean([resample(real[s], generated[s], reference.counts) for s in seeds], axis=0)
+    found = measure(name, "all", float(np.mean(values)), generated.shape[1], replicates=draws, judge_values=values,
+                    floor=reference.floors[name], details=details)  # fmt: skip
+    return Scored((found,), {}, {f"{name}|all": draws})
+
+
+SET_FEATURES = {
+    "fmd[stgcn-content]": "content_features",
+    "fmd[stgcn-style]": "style_features",
+    "fmd[dae]": "autoencoder_components",
+    "kid[stgcn-content]": "content_features",
+    "kid[stgcn-style]": "style_features",
+}
+"""Set distance -> the features it is taken on, as a field of ``Embedding``."""
+
+
+def floors(reference: Reference) -> dict[str, float]:
+    """Every distance between real motion of the fit part and the real part, at the tasks' n, mean over judge seeds."""
+    found = {}
+    for name, features in SET_FEATURES.items():
+        exact = _frechet if name.startswith("fmd") else kernel.kernel_distance
+        real, floor = (
+            getattr(side.embedding, features).astype(np.float64) for side in (reference.real, reference.floor)
+        )
+        found[name] = float(np.mean([exact(a, b) for a, b in zip(real, floor, strict=True)]))
+    for name, form in (("conditional_kid", _Kid()), ("conditional_fmd", _Fmd(reference))):
+        style, content = (_sides(kind, reference.floor, reference, form, None, None)[0] for kind in SIDES)
+        found[name] = float(np.maximum(style, content).mean())
+    return found
 
 
 def _frechet(real: FloatArray, generated: FloatArray) -> float:
     return frechet.frechet_distance(real, generated).value
-
-
-def _shown_set_distance(
-    name: str, slice_name: str, values: Sequence[float], draws: FloatArray, floor: float, details: dict[str, float],
-    n: int,
-) -> Measurement:  # fmt: skip
-    fewest, needed = min(n, int(details["n_real"])), 2 * int(details["d"])
-    if name.startswith("fmd") and fewest < needed:
-        return measure(
-            name,
-            slice_name,
-            float("nan"),
-            n,
-            details=details,
-            reason=f"n = {fewest} is below 2 d = {needed}: the number would be mostly bias",
-        )
-    return measure(
-        name, slice_name, float(np.mean(values)), n, replicates=draws, judge_values=values, floor=floor, details=details
-    )
