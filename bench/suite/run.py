@@ -14,6 +14,7 @@ from typing import Any
 
 from bench.adapters import ADAPTERS
 from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
+from bench.datasets.base import Dataset
 from bench.datasets.table import load_dataset
 from bench.errors import BadConfig
 from bench.protocols import PROTOCOLS
@@ -116,9 +117,10 @@ def protocols_of(request: RunRequest) -> list[Protocol]:
 
 def dry_run(request: RunRequest, progress: Progress) -> list[tuple[Setting, list[Cell], Estimate]]:
     """The cells of a run and what they would cost; loads the data, runs nothing."""
+    datasets = _loaded(request, progress)
     store = Store(request.store)
     plans = []
-    for setting in _settings(request, store, progress):
+    for setting in _settings(request, datasets, store):
         cells = _cells(request, setting)
         plans.append((setting, cells, estimate(setting, cells, store, request.jobs)))
     return plans
@@ -131,14 +133,13 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     ------
     BenchError : a request that cannot be run; a failing method is a record, not an error.
     """
-    sources_of(request)
-    protocols_of(request)
+    datasets = _loaded(request, progress)
     store = Store(request.store)
     store.sweep()
     records_folder = _fresh_records_folder(request.out)
     records: list[Record] = []
     generated = scored = 0
-    for setting in _settings(request, store, progress):
+    for setting in _settings(request, datasets, store):
         part = _RunSetting(request, setting, store, progress).run(records_folder)
         records.extend(part.records)
         generated += part.generated
@@ -148,26 +149,38 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
 
 def _fresh_records_folder(out: Path) -> Path:
     folder = out / "records"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for old in folder.iterdir():
-            old.unlink()
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(13, "Permission denied")
-    except OSError as error:
-        raise BadConfig(
-            f"the output folder cannot be written: {error.strerror}", where=str(out), remedy="choose another with --out"
-        ) from error
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.iterdir():
+        old.unlink()
     return folder
 
 
-def _settings(request: RunRequest, store: Store, progress: Progress) -> list[Setting]:
-    settings = []
-    for name, path in request.data.items():
-        dataset = load_dataset(name, path, lambda what, done, total: progress("data", what, done, total))
-        for protocol in protocols_of(request):
-            settings.append(prepare(dataset, protocol, request.profile, store, split_kind=request.split))
-    return settings
+def _loaded(request: RunRequest, progress: Progress) -> list[Dataset]:
+    """The datasets, after everything that can be refused without reading them has been checked; writes nothing."""
+    sources_of(request)
+    protocols_of(request)
+    for option, folder in (("--out", request.out), ("--store", request.store)):
+        _check_writable(folder, option)
+    return [
+        load_dataset(name, path, lambda what, done, total: progress("data", what, done, total))
+        for name, path in request.data.items()
+    ]
+
+
+def _check_writable(folder: Path, option: str) -> None:
+    existing = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.exists())
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        raise BadConfig(
+            f"{folder} cannot be written: {existing} is not a writable folder", remedy=f"choose another with {option}"
+        )
+
+
+def _settings(request: RunRequest, datasets: Sequence[Dataset], store: Store) -> list[Setting]:
+    return [
+        prepare(dataset, protocol, request.profile, store, split_kind=request.split)
+        for dataset in datasets
+        for protocol in protocols_of(request)
+    ]
 
 
 def _cells(request: RunRequest, setting: Setting) -> list[Cell]:
