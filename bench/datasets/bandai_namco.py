@@ -11,15 +11,17 @@ import csv
 import hashlib
 import re
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.cache import Made, cached_takes
 from bench.datasets.take import Take
-from bench.errors import BadData, BadFile, BenchError
+from bench.errors import BadData, BadFile, BadMotion, BenchError
 from bench.motion.bvh import BvhMotion, read_bvh
 from bench.motion.edit import on_floor
 from bench.motion.retarget import to_canonical
@@ -68,8 +70,10 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
     BadData : no path, nothing there, or no take of the dataset in it.
     BadFile : not a folder or zip, or broken BVH files; the first is named with its line.
     """
-    if path is None or not path.exists():
-        raise BadData(f"no such file or folder: {path}", where=NAME, remedy=HOW_TO_GET)
+    if path is None:
+        raise BadData("it is read from your copy, and no path is given", where=NAME, remedy=HOW_TO_GET)
+    if not path.exists():
+        raise BadData("no such file or folder", where=str(path), remedy=HOW_TO_GET)
     files = _files(path)
     published = published_takes()
     if set(published) <= set(files):
@@ -90,9 +94,10 @@ def write_takes_csv(source: Path, target: Path) -> None:
     with target.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["name", "frames", "digest"])
-        for name in sorted(files):
-            motion = read_bvh(files[name].read(), name=f"{name}.bvh")
-            writer.writerow([name, motion.n_frames, channel_digest(motion)])
+        with _opened(source, files) as content_of:
+            for name in sorted(files):
+                motion = read_bvh(content_of(name), name=f"{name}.bvh")
+                writer.writerow([name, motion.n_frames, channel_digest(motion)])
 
 
 def channel_digest(motion: BvhMotion) -> str:
@@ -138,35 +143,36 @@ def _merged_note(contents: Sequence[str]) -> list[str]:
     return ["raise-up and wave of the same hand are judged as one content"] if merged else []
 
 
-@dataclass(frozen=True)
-class _File:
-    """A BVH on disk or in a zip."""
-
-    path: Path
-    member: str = ""
-
-    def read(self) -> bytes:
-        if not self.member:
-            return self.path.read_bytes()
-        with zipfile.ZipFile(self.path) as archive:
-            return archive.read(self.member)
+Files = Mapping[str, str]
+"""Take name -> path inside the folder, or member of the zip."""
 
 
-def _files(path: Path) -> dict[str, _File]:
-    """BVH files of the dataset by name, from a folder or a zip."""
-    found = dict(_in_folder(path) if path.is_dir() else _in_zip(path))
+def _files(path: Path) -> Files:
+    """BVH files of the dataset, from a folder or a zip."""
+    inside = _in_folder(path) if path.is_dir() else _in_zip(path)
+    found: dict[str, str] = {}
+    others = 0
+    for place in inside:
+        name = PurePosixPath(place)
+        if not FILE_NAME.fullmatch(name.name):
+            others += 1
+        elif name.stem in found:
+            problem = f"{name.name} is there twice: {found[name.stem]} and {place}"
+            raise BadData(problem, where=str(path), cause="two copies of the dataset", remedy="give one of them")
+        else:
+            found[name.stem] = place
     if not found:
-        raise BadData("no file called like dataset-2_walk_normal_001.bvh in it", where=str(path), remedy=HOW_TO_GET)
+        instead = f", but {others} other BVH files" if others else ""
+        problem = f"expected files called like dataset-2_walk_normal_001.bvh, found none{instead}"
+        raise BadData(problem, where=str(path), remedy=HOW_TO_GET)
     return found
 
 
-def _in_folder(path: Path) -> Iterator[tuple[str, _File]]:
-    for file in sorted(path.rglob("*.bvh")):
-        if FILE_NAME.fullmatch(file.name) and not file.is_symlink():
-            yield file.stem, _File(file)
+def _in_folder(path: Path) -> Iterator[str]:
+    return (file.relative_to(path).as_posix() for file in sorted(path.rglob("*.bvh")))
 
 
-def _in_zip(path: Path) -> Iterator[tuple[str, _File]]:
+def _in_zip(path: Path) -> Iterator[str]:
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
@@ -175,30 +181,56 @@ def _in_zip(path: Path) -> Iterator[tuple[str, _File]]:
             f"expected a folder or a zip, got neither ({error})", where=str(path), remedy=HOW_TO_GET
         ) from error
     for member in members:
-        name = Path(member.filename)
-        if name.is_absolute() or ".." in name.parts:
-            raise BadFile(f"member {member.filename!r} lies outside the archive", where=str(path))
-        if FILE_NAME.fullmatch(name.name):
+        place = PurePosixPath(member.filename.replace("\\", "/"))
+        if place.is_absolute() or ".." in place.parts:
+            problem = f"member {member.filename!r} lies outside the archive"
+            raise BadFile(problem, where=str(path), cause="not the archive as published", remedy=HOW_TO_GET)
+        if place.suffix == ".bvh":
             if member.file_size > MAX_MEMBER_BYTES:
-                raise BadFile(f"{member.filename} claims {member.file_size} bytes", where=str(path))
-            yield name.stem, _File(path, member.filename)
+                problem = f"expected at most {MAX_MEMBER_BYTES} bytes, {member.filename} claims {member.file_size}"
+                raise BadFile(problem, where=str(path), cause="not the archive as published", remedy=HOW_TO_GET)
+            yield member.filename
+
+
+@contextmanager
+def _opened(path: Path, files: Files) -> Iterator[Callable[[str], bytes]]:
+    """What gives a take's file by the take's name. A zip is opened once: listing its members takes longer than a take.
+
+    A file that cannot be read is a :class:`BadFile`.
+    """
+    archive = None if path.is_dir() else zipfile.ZipFile(path)
+
+    def content_of(name: str) -> bytes:
+        try:
+            return (path / files[name]).read_bytes() if archive is None else archive.read(files[name])
+        except (OSError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError) as error:
+            cause = "a damaged or encrypted archive" if archive else "no permission, or a damaged disk"
+            raise BadFile(f"cannot be read ({error})", where=f"{name}.bvh", cause=cause) from error
+
+    try:
+        yield content_of
+    finally:
+        if archive is not None:
+            archive.close()
 
 
 def _read_cached(
-    path: Path, files: Mapping[str, _File], names: Sequence[str], progress: ProgressCallback | None
+    path: Path, files: Files, names: Sequence[str], progress: ProgressCallback | None
 ) -> tuple[list[Take], dict[str, str]]:
     key = f"{NAME}-{READER_VERSION}-{_content_digest(path, files, names)}"
-    takes, facts = cached_takes(key, lambda: _read(files, names, progress))
+    takes, facts = cached_takes(key, lambda: _read(path, files, names, progress))
     digests: dict[str, str] = facts["digests"]
     return list(takes), digests
 
 
-def _content_digest(path: Path, files: Mapping[str, _File], names: Sequence[str]) -> str:
+def _content_digest(path: Path, files: Files, names: Sequence[str]) -> str:
     """Digest of what will be read: the archive as a whole, or each file of a folder."""
     state = hashlib.blake2b("\n".join(names).encode(), digest_size=16)
     if path.is_dir():
-        for name in names:
-            state.update(files[name].read())
+        with _opened(path, files) as content_of:
+            for name in names:
+                content = content_of(name)
+                state.update(len(content).to_bytes(8, "little") + content)
     else:
         with path.open("rb") as file:
             while chunk := file.read(2**22):
@@ -206,23 +238,25 @@ def _content_digest(path: Path, files: Mapping[str, _File], names: Sequence[str]
     return state.hexdigest()
 
 
-def _read(files: Mapping[str, _File], names: Sequence[str], progress: ProgressCallback | None) -> Made:
+def _read(path: Path, files: Files, names: Sequence[str], progress: ProgressCallback | None) -> Made:
     takes: list[Take] = []
     digests: dict[str, str] = {}
     broken: list[BenchError] = []
-    for done, name in enumerate(names):
-        try:
-            motion = read_bvh(files[name].read(), name=f"{name}.bvh")
-            takes.append(_take(name, motion))
-            digests[name] = channel_digest(motion)
-        except BenchError as error:
-            broken.append(error)
-        if progress:
-            progress("reading BVH files", done + 1, len(names))
+    with _opened(path, files) as content_of:
+        for done, name in enumerate(names, start=1):
+            try:
+                motion = read_bvh(content_of(name), name=f"{name}.bvh")
+                takes.append(_take(name, motion))
+                digests[name] = channel_digest(motion)
+            except BenchError as error:
+                broken.append(error)
+            if progress:
+                progress("reading BVH files", done, len(names))
     if broken:
         raise BadFile(
-            f"{len(broken)} of {len(names)} BVH files cannot be read, first: {broken[0]}",
-            remedy="download them again, or remove them",
+            f"{len(broken)} of {len(names)} BVH files cannot be read, the first is {broken[0]}",
+            where=str(path),
+            remedy="get the broken files again, or remove them",
         )
     return takes, {"digests": digests}
 
@@ -230,9 +264,15 @@ def _read(files: Mapping[str, _File], names: Sequence[str], progress: ProgressCa
 def _take(name: str, motion: BvhMotion) -> Take:
     found = FILE_NAME.fullmatch(f"{name}.bvh")
     if found is None:
-        raise BadFile(f"{name} is not called like a take of the dataset")
+        raise BadFile("not called like a take of the dataset", where=f"{name}.bvh")
+    if motion.fps != FPS:
+        cause = "a resampled or edited file"
+        raise BadFile(f"expected {FPS:g} frames per second, got {motion.fps:.6g}", where=f"{name}.bvh", cause=cause)
+    try:
+        clip = on_floor(to_canonical(motion, BANDAI_NAMCO, unit_m=UNIT_M))
+    except BadMotion as error:
+        raise BadFile(error.problem, where=f"{name}.bvh", cause=error.cause) from error
     prefix = "dataset-1_" if found["set"] == "1" else ""
-    clip = on_floor(to_canonical(motion, BANDAI_NAMCO, unit_m=UNIT_M, fps=FPS))
     return Take(
         clip,
         take_id=f"{prefix}{found['content']}_{found['style']}_{found['number']}",

@@ -16,7 +16,7 @@ from typing import Any
 
 from bench.datasets.pack import Pack, write_pack
 from bench.datasets.take import Take
-from bench.errors import BadFile
+from bench.errors import BenchError
 
 FACTS_FILE = "facts.json"
 
@@ -47,7 +47,7 @@ def _read(folder: Path) -> tuple[tuple[Take, ...], dict[str, Any]] | None:
     try:
         facts: dict[str, Any] = json.loads((folder / FACTS_FILE).read_text())
         return Pack.open(folder).takes(), facts
-    except (OSError, ValueError, KeyError, BadFile):
+    except (OSError, ValueError, KeyError, TypeError, BenchError):
         return None
 
 
@@ -57,9 +57,26 @@ def _store(folder: Path, takes: Sequence[Take], facts: dict[str, Any]) -> None:
         draft.mkdir(parents=True)
         write_pack(draft, takes)
         (draft / FACTS_FILE).write_text(json.dumps(facts))
-        shutil.rmtree(folder, ignore_errors=True)
-        draft.rename(folder)
+        _flush(draft)
+        _publish(draft, folder)
     except OSError:
         pass
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _flush(folder: Path) -> None:
+    """Put the files on the disk before their folder gets its name: a power cut must not leave zeros under it."""
+    for file in folder.iterdir():
+        with file.open("rb") as handle:
+            os.fsync(handle.fileno())
+
+
+def _publish(draft: Path, folder: Path) -> None:
+    try:
+        draft.rename(folder)
+    except OSError:
+        # Something is there: what another process has stored meanwhile stays, a damaged entry is replaced.
+        if _read(folder) is None:
+            shutil.rmtree(folder, ignore_errors=True)
+            draft.rename(folder)

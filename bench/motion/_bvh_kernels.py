@@ -14,7 +14,13 @@ END_OF_BLOCK, ODD_TOKENS_FULL, SHORT_ROW, LONG_ROW, TOO_MANY_ROWS = 0, 1, 2, 3, 
 # same as that of a correctly rounded parser (Clinger 1990).
 _EXACT_MANTISSA = 1 << 53
 _POWERS_OF_TEN = np.array([float(10**k) for k in range(23)])
-_SPACE, _NEWLINE, _PLUS, _MINUS, _DOT, _ZERO, _NINE = 32, 10, 43, 45, 46, 48, 57
+_SPACE, _TAB, _NEWLINE, _CARRIAGE_RETURN = 32, 9, 10, 13
+_PLUS, _MINUS, _DOT, _ZERO, _NINE = 43, 45, 46, 48, 57
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _is_space(byte: np.uint8) -> bool:
+    return bool(byte == _SPACE or (byte >= _TAB and byte <= _CARRIAGE_RETURN))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -31,7 +37,7 @@ def parse_rows(
     size, n_odd = text.size, 0
     while position < size:
         byte = text[position]
-        if byte <= _SPACE:
+        if _is_space(byte):
             if byte == _NEWLINE:
                 if on_line != 0 and on_line != columns:
                     return SHORT_ROW, position, index, on_line, n_odd
@@ -66,12 +72,12 @@ def parse_rows(
             digits > 0
             and mantissa < _EXACT_MANTISSA
             and decimals < 23
-            and (position == size or text[position] <= _SPACE)
+            and (position == size or _is_space(text[position]))
         ):
             value = mantissa / _POWERS_OF_TEN[decimals]
             values[index] = -value if negative else value
         else:
-            while position < size and text[position] > _SPACE:
+            while position < size and not _is_space(text[position]):
                 position += 1
             odd[n_odd, 0], odd[n_odd, 1], odd[n_odd, 2] = start, position, index
             n_odd += 1
