@@ -78,6 +78,7 @@ class _HierarchyReader:
         self.last_line = text.count("\n") + 1
         self.at = 0
         self.names: list[str] = []
+        self.taken: set[str] = set()
         self.parents: list[int] = []
         self.offsets: list[tuple[float, ...] | None] = []
         self.channels: list[tuple[str, ...] | None] = []
@@ -127,7 +128,7 @@ class _HierarchyReader:
         name = self._rest_of_line(line)
         if not name:
             raise Refusal(line, f"{keyword.upper()} without a name")
-        if name in self.names:
+        if name in self.taken:
             raise Refusal(line, f"joint {name} appears twice", remedy="rename one of the two")
         if keyword == "root" and self.names:
             raise Refusal(line, f"a second ROOT {name}", "several characters in one file", "export them separately")
@@ -139,6 +140,7 @@ class _HierarchyReader:
         self.parents.append(self.open_joints[-1][0] if self.open_joints else -1)
         self.open_joints.append((len(self.names), line))
         self.names.append(name)
+        self.taken.add(name)
         self.offsets.append(None)
         self.channels.append(None)
 

@@ -53,14 +53,14 @@ class BvhMotion:
 
     @property
     def fps(self) -> float:
-        """Frames per second: the whole number whose printed inverse ``frame_time_s`` is, else its exact inverse.
+        """Frames per second: the whole number whose inverse, rounded or cut off, is written; else the exact inverse.
 
-        0.0333333 gives 30, 0.008333 gives 120, 0.0333667 gives 29.97.
+        0.0333333 and 0.0333 give 30, 0.0166 and 0.0167 give 60, 0.008333 gives 120, 0.0333667 gives 29.97.
         """
         whole = round(1.0 / self.frame_time_s)
         exponent = Decimal(repr(self.frame_time_s)).as_tuple().exponent
         last_digit = 10.0**exponent if isinstance(exponent, int) else 0.0
-        if whole > 0 and abs(1.0 / whole - self.frame_time_s) < last_digit:
+        if whole > 0 and -0.5 * last_digit <= 1.0 / whole - self.frame_time_s < last_digit:
             return float(whole)
         return 1.0 / self.frame_time_s
 
