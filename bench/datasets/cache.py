@@ -47,7 +47,7 @@ def _read(folder: Path) -> tuple[tuple[Take, ...], dict[str, Any]] | None:
     try:
         facts: dict[str, Any] = json.loads((folder / FACTS_FILE).read_text())
         return Pack.open(folder).takes(), facts
-    except (OSError, ValueError, KeyError, TypeError, BenchError):
+    except (OSError, EOFError, ValueError, KeyError, TypeError, BenchError):
         return None
 
 
