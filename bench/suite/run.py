@@ -25,7 +25,7 @@ from bench.suite.judging import JudgesOnDisk, embed, judges_for
 from bench.suite.plan import Cell, Estimate, estimate, plan_cells
 from bench.suite.provenance import provenance
 from bench.suite.reference import build_reference, reference_key
-from bench.suite.score import Scorer, ScoreSpec, score_in_process
+from bench.suite.score import Scorer, ScoreSpec, pin_threads, score_in_process
 from bench.suite.setting import Setting, prepare
 from bench.suite.store import Store
 from bench.suite.workers import Limits, Outcome, run_job
@@ -133,6 +133,7 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     ------
     BenchError : a request that cannot be run; a failing method is a record, not an error.
     """
+    pin_threads(request.limits.threads)
     datasets = _loaded(request, progress)
     store = Store(request.store)
     store.sweep()
@@ -207,7 +208,12 @@ class _RunSetting:
         self.progress("cells", self.setting.dataset.dataset_id, 0, len(cells))
         context = multiprocessing.get_context("spawn")
         with (
-            ProcessPoolExecutor(self.request.jobs, mp_context=context) as pool,
+            ProcessPoolExecutor(
+                self.request.jobs,
+                mp_context=context,
+                initializer=pin_threads,
+                initargs=(self.request.limits.threads,),
+            ) as pool,
             ThreadPoolExecutor(self.request.jobs) as threads,
         ):
             futures = [threads.submit(self._run_cell, cell, pool) for cell in cells]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bench.arrays import FloatArray
 from bench.datasets.pack import Pack
@@ -169,6 +170,11 @@ def _write_embedding(folder: Path, embedding: Embedding) -> dict[str, Any]:
 def open_scorer(spec: ScoreSpec) -> Scorer:
     """One scorer per process and setting."""
     return Scorer(spec)
+
+
+def pin_threads(threads: int) -> None:
+    """Limit the linear algebra of this process: many small factorisations are far slower on contended threads."""
+    threadpool_limits(limits=threads)
 
 
 def score_in_process(spec: ScoreSpec, motions_key: str, given: bool) -> list[str]:
