@@ -253,9 +253,11 @@ def _read(path: Path, files: Files, names: Sequence[str], progress: ProgressCall
             if progress:
                 progress("reading BVH files", done, len(names))
     if broken:
+        first = broken[0]
         raise BadFile(
-            f"{len(broken)} of {len(names)} BVH files cannot be read, the first is {broken[0]}",
+            f"{len(broken)} of {len(names)} BVH files cannot be read, the first is {first.where}: {first.problem}",
             where=str(path),
+            cause=first.cause,
             remedy="get the broken files again, or remove them",
         )
     return takes, {"digests": digests}

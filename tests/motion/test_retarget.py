@@ -59,10 +59,10 @@ SOURCES = [
 ]
 """Maps and the trees they are for (Park 2021's 31 CMU joints; the 22 of Bandai-Namco)."""
 
-BANDAI_NAMCO_FOLDING_MEAN_M, BANDAI_NAMCO_FOLDING_MAX_M = 0.004, 0.03
-"""Bounds of what a shoulder's turn away from its T-pose costs; measured on 1310 takes, see the slow test."""
+BANDAI_NAMCO_FOLDING_MEAN_M, BANDAI_NAMCO_FOLDING_MAX_M = 0.003, 0.025
+"""Bounds on what a shoulder's turn away from its T-pose costs. The 1310 takes have 2.3 mm and 24.3 mm, arms only."""
 CMU_FOLDING_MEAN_M, CMU_FOLDING_MAX_M = 0.03, 0.13
-"""The same for the four clips of Xia 2015, where clavicles are raised with the arms."""
+"""The same for four clips of Xia 2015, 26 mm and 122 mm: clavicles rise with the arms, the lower back bends."""
 
 
 def source_motion(
