@@ -23,7 +23,7 @@ from bench.errors import BadData, BadFile
 from bench.motion.bvh import BvhMotion, read_bvh
 from bench.motion.kinematics import floor_height, world_positions
 from tests.golden.make_bvh import POSITIONS, ZXY, Joint, text_of
-from tests.motion.test_retarget import BANDAI_NAMCO_TREE
+from tests.motion.source_trees import BANDAI_NAMCO_TREE
 
 NAMES = ("dataset-2_walk_normal_001", "dataset-2_walk_normal_002", "dataset-2_wave-left-hand_active_001")
 DEPTH_IN_ZIP = "dataset/Bandai-Namco-Research-Motiondataset-2/data"
