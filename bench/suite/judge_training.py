@@ -15,7 +15,7 @@ from bench.datasets.base import Dataset, ProgressCallback
 from bench.datasets.split import Split, leak
 from bench.datasets.take import Take
 from bench.errors import BadData
-from bench.motion.edit import windows
+from bench.motion.edit import mirror, windows
 from bench.motion.representation import JUDGE_SLICES, window_frame
 from bench.motion.skeleton import CANONICAL_PARENTS, N_JOINTS
 from bench.suite.judge_card import (
@@ -39,7 +39,7 @@ CENTRE = slice(20, 44)
 """The 24 frames of a window that the auto-encoder reads."""
 
 
-CLASSIFIER_TRAINING = TrainingConfig(n_steps=200)
+CLASSIFIER_TRAINING = TrainingConfig(n_steps=200, peak_rate=8e-3, weight_decay=0.05)
 AUTOENCODER_TRAINING = TrainingConfig(n_steps=1000, batch_size=32, peak_rate=4e-3)
 
 
@@ -158,9 +158,10 @@ class _Windows:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """What training and measuring need of a split."""
+    """What training and measuring need of a split; ``mirrored`` is the judge part with left and right exchanged."""
 
     judge: _Windows
+    mirrored: _Windows
     test: _Windows
     real: _Windows
     unseen: _Windows | None
@@ -170,7 +171,10 @@ class _Parts:
         judge, test, real = (
             _Windows.of(dataset, split.select(dataset.takes, part)) for part in ("judge", "test", "real")
         )
-        return cls(judge, test, real, _Windows.of(dataset, unseen) if unseen else None)
+        mirrored = _Windows.of(
+            dataset, [take.with_clip(mirror(take.clip)) for take in split.select(dataset.takes, "judge")]
+        )
+        return cls(judge, mirrored, test, real, _Windows.of(dataset, unseen) if unseen else None)
 
     @property
     def held_out(self) -> NDArray[np.float32]:
@@ -200,11 +204,21 @@ def _targets(dataset: Dataset) -> dict[str, tuple[str, ...]]:
 def _train_classifier(
     parts: _Parts, dataset: Dataset, target: str, seed: int, recipe: JudgeRecipe, progress: ProgressCallback | None
 ) -> tuple[Stgcn, History]:
-    network = StgcnConfig(CANONICAL_PARENTS, len(_targets(dataset)[target]))
-    step = _step_callback(progress, f"{target} judge {seed}")
+    labels = _targets(dataset)[target]
+    sources = (parts.judge,) if _name_a_side(labels) else (parts.judge, parts.mirrored)
     return train_classifier(
-        parts.judge.features, parts.judge.index[target], network, recipe.classifier, seed=seed, progress=step
+        np.concatenate([source.features for source in sources]),
+        np.concatenate([source.index[target] for source in sources]),
+        StgcnConfig(CANONICAL_PARENTS, len(labels)),
+        recipe.classifier,
+        seed=seed,
+        progress=_step_callback(progress, f"{target} judge {seed}"),
     )
+
+
+def _name_a_side(labels: Sequence[str]) -> bool:
+    """True where a label would be wrong on a mirrored motion."""
+    return any(side in label.lower() for label in labels for side in ("left", "right"))
 
 
 def _train_autoencoder(

@@ -27,7 +27,6 @@ from reports.records import digest_of
 
 REFERENCE_VERSION = 1
 REAL_STRIDE_FRAMES = 32
-FIT_BANK_STRIDE_FRAMES = 2
 CONDITIONAL_COMPONENTS = 16
 
 Embed = Callable[[Motions], Embedding]
@@ -51,11 +50,11 @@ def build_reference(setting: Setting, embed: Embed, folder: Path) -> dict[str, A
     real = windows_of(setting.part("real"))
     floor = _floor_windows(setting)
     judge_part = embed(windows_of(setting.part("judge")))
-    fit_bank = DescriptorBank.of(setting.part("fit"), FIT_BANK_STRIDE_FRAMES)
+    fit_bank = DescriptorBank.of(setting.part("fit"), 1)
     test_bank = DescriptorBank.of(setting.part("test"), 1)
     test_windows = windows_of(setting.part("test")).window_features()[..., :3]
     threshold = copy_threshold(fit_bank.nearest(pose_descriptors(test_windows)))
-    jerk = jerk_per_sample(real.world_positions(), real.fps, joints=_real_joints(real))
+    jerk = jerk_per_sample(floor.world_positions(), floor.fps, joints=_real_joints(floor))
     for name, motions in (("real", real), ("floor", floor)):
         (folder / name).mkdir()
         embed(motions).save(folder / name)
@@ -71,7 +70,7 @@ def build_reference(setting: Setting, embed: Embed, folder: Path) -> dict[str, A
     for name, bank in (("fit_bank", fit_bank), ("test_bank", test_bank)):
         np.savez(folder / f"{name}.npz", descriptors=bank.descriptors, take_index=bank.take_index,
                  take_ids=np.array(bank.take_ids))  # fmt: skip
-    np.save(folder / "real_jerk.npy", jerk)
+    np.save(folder / "floor_jerk.npy", jerk)
     facts: dict[str, Any] = {"copy_threshold": threshold, "n_seeds": judge_part.n_seeds, "floors": {}}
     whole = load_reference(
         folder,
@@ -114,7 +113,7 @@ def load_reference(
         fit_bank=_bank(folder / "fit_bank.npz"),
         test_bank=_bank(folder / "test_bank.npz"),
         copy_threshold=float(facts["copy_threshold"]),
-        real_jerk=np.load(folder / "real_jerk.npy", allow_pickle=False),
+        floor_jerk=np.load(folder / "floor_jerk.npy", allow_pickle=False),
         floors=facts["floors"],
         counts=cluster_counts(clusters, seed=stable_seed("bootstrap", protocol_id)),
     )

@@ -74,7 +74,7 @@ def reference() -> Reference:
         fit_bank=DescriptorBank.of(fit, 4),
         test_bank=DescriptorBank.of(test, 1),
         copy_threshold=0.01,
-        real_jerk=np.full(120, 50.0),
+        floor_jerk=np.full(N_TASKS, 50.0),
         floors=FLOORS,
         counts=cluster_counts(np.array([task.content_take_id for task in tasks]), 50, seed=0),
     )

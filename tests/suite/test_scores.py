@@ -109,7 +109,7 @@ def test_sources_are_copies_unless_nothing_was_given(ref: Reference) -> None:
 
 def test_jerk_ratio_is_to_real_motion_and_doubles_with_it(ref: Reference) -> None:
     once = value(SCORES["jerk_ratio"](row(ref), ref), "all")
-    half = replace(ref, real_jerk=np.full(120, 25.0))
+    half = replace(ref, floor_jerk=np.full(N_TASKS, 25.0))
     assert value(SCORES["jerk_ratio"](row(half), half), "all") == pytest.approx(2 * once)
 
 

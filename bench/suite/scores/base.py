@@ -43,7 +43,7 @@ class Reference:
     style_components, content_components : per judge seed, 16 principal components fitted on the judge part.
     fit_bank, test_bank : descriptors of motion that methods were given.
     copy_threshold : distance below which an output is a copy.
-    real_jerk : jerk ``[m]`` of the windows of the real part, m/s^3.
+    floor_jerk : jerk ``[n]`` of the floor windows, which are drawn the way sources are, m/s^3.
     floors : metric name -> the distance of ``floor`` from ``real``.
     counts : ``[B, n]`` bootstrap counts shared by all rows.
     """
@@ -58,7 +58,7 @@ class Reference:
     fit_bank: DescriptorBank
     test_bank: DescriptorBank
     copy_threshold: float
-    real_jerk: FloatArray
+    floor_jerk: FloatArray
     floors: Mapping[str, float]
     counts: NDArray[np.int32]
 

@@ -35,7 +35,7 @@ def jerk_ratio(row: Row, reference: Reference) -> Scored:
     """Mean jerk over that of real motion with the same mixture of contents."""
     jerk = physics.jerk_per_sample(row.positions_m, row.motions.fps, joints=row.joints)
     per_content = np.array(
-        [reference.real_jerk[reference.real.contents == c].mean() for c in range(len(reference.content_labels))]
+        [reference.floor_jerk[reference.floor.contents == c].mean() for c in range(len(reference.content_labels))]
     )
     expected = per_content[row.contents]
     measurements, replicates = [], {}
@@ -52,7 +52,7 @@ def jerk_ratio(row: Row, reference: Reference) -> Scored:
 def jerk_ratio_worst_content(row: Row, reference: Reference) -> Scored:
     """The per-content jerk ratio that is farthest from 1, as a factor."""
     jerk = physics.jerk_per_sample(row.positions_m, row.motions.fps, joints=row.joints)
-    ratios = physics.ratio_per_content(reference.real_jerk, reference.real.contents, jerk, row.contents)
+    ratios = physics.ratio_per_content(reference.floor_jerk, reference.floor.contents, jerk, row.contents)
     with np.errstate(divide="ignore"):
         worst = max(ratios, key=lambda content: abs(np.log(ratios[content])))
     details = {f"content={reference.content_labels[c]}": ratio for c, ratio in ratios.items()}
