@@ -41,7 +41,7 @@ def to_canonical(
     Raises
     ------
     BadMotion : a mapped joint is missing, or the frame rate is not one of a motion.
-    BadConfig : another ``up``.
+    BadConfig : another ``up``, or a ``unit_m`` that is not positive.
     """
     positions, rotations = _canonical_world(bvh, skeleton_map, unit_m, up)
     skeleton = _skeleton(bvh, skeleton_map, unit_m)
@@ -66,6 +66,8 @@ def _canonical_world(
     """World positions ``[F, 21, 3]`` (metres, NaN for virtual joints) and rotations relative to the T-pose."""
     if up not in ("y", "z"):
         raise BadConfig(f"up must be 'y' or 'z', got {up!r}", where="up")
+    if not 0.0 < unit_m < np.inf:
+        raise BadConfig(f"unit_m must be metres per file unit, got {unit_m}", where="unit_m", remedy="0.01 is a cm")
     sources = _source_indices(bvh, skeleton_map)
     source_positions, source_rotations = world_motion(bvh)
     rest = np.stack([skeleton_map.t_pose_wxyz.get(bvh.names[source], quat.IDENTITY) for source in sources])

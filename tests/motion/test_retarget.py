@@ -190,6 +190,12 @@ def test_other_up_is_refused() -> None:
         to_canonical(source_motion(CMU_31, CMU_31_TREE), CMU_31, unit_m=0.01, up="x")
 
 
+@pytest.mark.parametrize("unit_m", [0.0, -0.01, np.nan, np.inf])
+def test_unit_is_refused(unit_m: float) -> None:
+    with pytest.raises(BadConfig, match="unit_m must be metres per file unit"):
+        to_canonical(source_motion(CMU_31, CMU_31_TREE), CMU_31, unit_m=unit_m)
+
+
 def test_maps_name_every_canonical_joint_once() -> None:
     joints = {name: name for name in CANONICAL_NAMES}
     with pytest.raises(BadConfig, match=r"toy: .*see \['Neck1'\]"):
