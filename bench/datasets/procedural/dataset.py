@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
@@ -61,8 +62,8 @@ def digest() -> str:
     return canonical_digest(
         {
             "generator": GENERATOR_VERSION,
-            "contents": sorted(CONTENTS),
-            "styles": sorted(STYLES),
+            "contents": {name: [c.cycles_per_s, c.beats, c.rhythm] for name, c in CONTENTS.items()},
+            "styles": {name: asdict(manner) for name, manner in STYLES.items()},
             "actors": ACTORS,
             "takes_per_cell": TAKES_PER_CELL,
             "frames": [LONG_FRAMES, SHORT_FRAMES, SHORT_EVERY],
