@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from bench.arrays import FloatArray
 from bench.errors import BadConfig, BadMotion
 from bench.motion import quat
-from bench.motion.bvh import BvhMotion, read_bvh
+from bench.motion.bvh import BvhMotion, read_bvh, world_motion, write_bvh
 from bench.motion.clip import Clip
 from bench.motion.kinematics import facing_yaw, forward_kinematics, world_positions
 from bench.motion.retarget import folding_error_m, to_canonical
@@ -226,16 +226,22 @@ def assert_t_pose(skeleton: Skeleton, tolerance_m: float) -> None:
     np.testing.assert_allclose(rest, mirrored, atol=0.03)
 
 
-def test_bandai_namco_takes(bandai_namco_zip: Path) -> None:
-    check_bandai_namco(bandai_namco_zip, slice(None, None, 131))
+def round_trip_error_m(clip: Clip, path: Path) -> float:
+    """How far world positions move when a clip is written to BVH and read again."""
+    write_bvh(path, clip)
+    return float(np.abs(world_motion(read_bvh(path))[0] * 0.01 - world_positions(clip)).max())
+
+
+def test_bandai_namco_takes(bandai_namco_zip: Path, tmp_path: Path) -> None:
+    check_bandai_namco(bandai_namco_zip, slice(None, None, 131), tmp_path)
 
 
 @pytest.mark.slow
-def test_all_bandai_namco_takes(bandai_namco_zip: Path) -> None:
-    assert check_bandai_namco(bandai_namco_zip, slice(None)) == 1310
+def test_all_bandai_namco_takes(bandai_namco_zip: Path, tmp_path: Path) -> None:
+    assert check_bandai_namco(bandai_namco_zip, slice(None), tmp_path) == 1310
 
 
-def check_bandai_namco(archive_path: Path, which: slice) -> int:
+def check_bandai_namco(archive_path: Path, which: slice, folder: Path) -> int:
     errors, skeletons = [], []
     with zipfile.ZipFile(archive_path) as archive:
         members = [name for name in archive.namelist() if name.endswith(".bvh")][which]
@@ -244,6 +250,7 @@ def check_bandai_namco(archive_path: Path, which: slice) -> int:
             clip = to_canonical(source, BANDAI_NAMCO, unit_m=0.01)
             errors.append(folding_error_m(source, clip, BANDAI_NAMCO, unit_m=0.01))
             skeletons.append(clip.skeleton)
+            assert round_trip_error_m(clip, folder / "take.bvh") < 1e-5
     assert_t_pose(skeletons[0], tolerance_m=1e-3)
     assert all(skeleton.same_bones(skeletons[0], 1e-6) for skeleton in skeletons)
     error = np.concatenate(errors)
@@ -254,7 +261,7 @@ def check_bandai_namco(archive_path: Path, which: slice) -> int:
     return len(members)
 
 
-def test_xia_files(xia_folder: Path) -> None:
+def test_xia_files(xia_folder: Path, tmp_path: Path) -> None:
     for file in sorted(xia_folder.glob("*.bvh")):
         source = read_bvh(file)
         clip = to_canonical(source, CMU_31, unit_m=CMU_UNIT_M)
@@ -264,6 +271,7 @@ def test_xia_files(xia_folder: Path) -> None:
         assert error.mean() < CMU_FOLDING_MEAN_M
         assert error.max() < CMU_FOLDING_MAX_M
         assert standing_height_m(clip) > 0.8
+        assert round_trip_error_m(clip, tmp_path / file.name) < 1e-5
 
 
 def standing_height_m(clip: Clip) -> float:
