@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.suite.plan import Cell
-from bench.suite.score import CellScores, ScoreSpec
-from bench.suite.scores.base import Reference
+from bench.suite.score import CellScores
+from bench.suite.scores.base import slices_of
 from bench.suite.setting import Setting
 from bench.suite.workers import Outcome
 from reports.records import (
@@ -87,14 +87,15 @@ def protocol_facts(setting: Setting) -> dict[str, str]:
     }
 
 
-def sample_arrays(spec: ScoreSpec, reference: Reference, scores: CellScores) -> dict[str, NDArray[Any]]:
+def sample_arrays(setting: Setting, scores: CellScores) -> dict[str, NDArray[Any]]:
     """The arrays of a samples file; see ``reports.records.read_samples`` for the names."""
-    tasks = reference.tasks
+    tasks = setting.tasks
+    masks = slices_of(tasks, setting.dataset.content_labels, setting.dataset.style_labels)
     arrays: dict[str, NDArray[Any]] = {
         "sample_id": np.array([task.sample_id for task in tasks]),
         "cluster": np.array([task.content_take_id for task in tasks]),
     }
-    arrays |= {f"slice/{name}": mask for name, mask in reference.slices.items()}
+    arrays |= {f"slice/{name}": mask for name, mask in masks.items()}
     for seed in range(scores.embedding.n_seeds):
         arrays[f"judge/stgcn-content/{seed}"] = scores.embedding.content_predicted[seed].astype(np.int8)
         arrays[f"judge/stgcn-style/{seed}"] = scores.embedding.style_predicted[seed].astype(np.int8)

@@ -199,6 +199,7 @@ class _RunSetting:
         self.progress = progress
         self.judges = self._judges()
         self.spec = self._spec()
+        self.scorer = Scorer(self.spec)
         self.generated = 0
         self.scored = 0
 
@@ -218,10 +219,7 @@ class _RunSetting:
         ):
             futures = [threads.submit(self._run_cell, cell, pool) for cell in cells]
             outcomes = self._gather(futures)
-        scorer = Scorer(self.spec)
-        records = [
-            self._record(scorer, cell, outcome, records_folder) for cell, outcome in zip(cells, outcomes, strict=True)
-        ]
+        records = [self._record(cell, outcome, records_folder) for cell, outcome in zip(cells, outcomes, strict=True)]
         return RunResult(tuple(records), self.generated, self.scored)
 
     def _judges(self) -> JudgesOnDisk:
@@ -272,7 +270,7 @@ class _RunSetting:
                 return outcome
             self.generated += 1
         digest = str(self.store.facts("motions", cell.motions_key)["motions_digest"])
-        if Scorer(self.spec).missing(digest):
+        if self.scorer.missing(digest):
             self.scored += len(pool.submit(score_in_process, self.spec, cell.motions_key, cell.given).result())
         return Outcome("ok")
 
@@ -305,9 +303,9 @@ class _RunSetting:
             self.progress("cells", self.setting.dataset.dataset_id, done, len(futures))
         return outcomes
 
-    def _record(self, scorer: Scorer, cell: Cell, outcome: Outcome, folder: Path) -> Record:
-        scores = scorer.collect(cell.motions_key) if outcome.status == "ok" else None
-        arrays = assemble.sample_arrays(self.spec, scorer.reference, scores) if scores else {}
+    def _record(self, cell: Cell, outcome: Outcome, folder: Path) -> Record:
+        scores = self.scorer.collect(cell.motions_key) if outcome.status == "ok" else None
+        arrays = assemble.sample_arrays(self.setting, scores) if scores else {}
         facts: dict[str, Any] = self.store.facts("motions", cell.motions_key) if scores else {}
         made = provenance(
             self.request.command,

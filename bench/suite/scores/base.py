@@ -21,6 +21,19 @@ from reports.records import Measurement
 PRIMARY_SLICE = "different_content"
 
 
+def slices_of(
+    tasks: Sequence[Task], content_labels: Sequence[str], style_labels: Sequence[str]
+) -> dict[str, BoolArray]:
+    """Slice name -> mask over the tasks; slices by content or style hold different-content tasks."""
+    same = np.array([task.same_content for task in tasks])
+    masks = {PRIMARY_SLICE: ~same, "same_content": same, "all": np.ones(len(same), dtype=bool)}
+    contents = np.array([task.content for task in tasks])
+    targets = np.array([task.target_style for task in tasks])
+    masks |= {f"content={name}": (contents == name) & ~same for name in content_labels}
+    masks |= {f"style={name}": (targets == name) & ~same for name in style_labels}
+    return {name: mask for name, mask in masks.items() if mask.any()}
+
+
 @dataclass(frozen=True, eq=False)
 class Labelled:
     """Judge outputs of windows with their true label indices ``[n]``."""
@@ -65,13 +78,7 @@ class Reference:
     @cached_property
     def slices(self) -> dict[str, BoolArray]:
         """Slice name -> mask over the tasks."""
-        same = np.array([task.same_content for task in self.tasks])
-        masks = {"different_content": ~same, "same_content": same, "all": np.ones(len(same), dtype=bool)}
-        contents = np.array([task.content for task in self.tasks])
-        targets = np.array([task.target_style for task in self.tasks])
-        masks |= {f"content={name}": (contents == name) & ~same for name in self.content_labels}
-        masks |= {f"style={name}": (targets == name) & ~same for name in self.style_labels}
-        return {name: mask for name, mask in masks.items() if mask.any()}
+        return slices_of(self.tasks, self.content_labels, self.style_labels)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,62 @@
+"""A tiny benchmark in a process of its own: ``python -m tests.suite.tiny OUT STORE [METRIC=VERSION ...]``.
+
+Twelve samples, four anchors and two small judges, on a few takes that are made here; everything else is the real thing.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from bench.datasets.base import Dataset, DatasetEntry
+from bench.datasets.table import DATASETS
+from bench.datasets.take import Take
+from bench.metrics import METRICS
+from bench.motion import quat
+from bench.protocols import PROTOCOLS
+from bench.suite import judging
+from bench.suite.judge_training import JudgeRecipe
+from bench.suite.judges import train_judges
+from bench.suite.run import RunRequest, RunResult, run
+from classifiers.train import TrainingConfig
+from tests.motion.factory import random_clip
+
+CONTENTS, STYLES = ("bow", "wave"), ("bent", "plain")
+METHODS = ("real-test", "copy-content", "mean-pose", "noise-0.1")
+
+
+def tiny_dataset() -> Dataset:
+    """Twenty takes in each of 2 x 2 cells that any judge can tell apart."""
+    takes = []
+    for place, (content, style) in enumerate((c, s) for c in CONTENTS for s in STYLES):
+        for number in range(20):
+            clip = random_clip(130, seed=100 * place + number, amount_rad=0.1)
+            rotations = clip.rotations_wxyz.copy()
+            raised = np.array([0.0, 0.0, 1.2 if content == "wave" else 0.0])
+            rotations[:, 13] = quat.multiply(rotations[:, 13], quat.from_rotation_vector(raised))
+            bent = np.array([0.6 if style == "bent" else 0.0, 0.0, 0.0])
+            rotations[:, 9] = quat.multiply(rotations[:, 9], quat.from_rotation_vector(bent))
+            take_id = f"{content}_{style}_{number:02d}"
+            takes.append(Take(clip.with_motion(rotations, clip.root_xyz_m), take_id, "tiny", content, style))
+    return Dataset("tiny", "tiny@1", "tiny-1", tuple(takes), {c: c for c in CONTENTS}, "none", "this test")
+
+
+def tiny_run(out: Path, store: Path, versions: dict[str, int] | None = None) -> RunResult:
+    """Run the tiny benchmark; ``versions`` raises the versions of metrics."""
+    DATASETS["tiny"] = DatasetEntry(lambda path, progress: tiny_dataset(), "tiny", "none", "none", needs_path=False)
+    name = "stylebench-transfer@1"
+    PROTOCOLS[name] = replace(PROTOCOLS[name], n_samples={"smoke": 12, "quick": 12, "standard": 12})
+    for metric, version in (versions or {}).items():
+        METRICS[metric] = replace(METRICS[metric], version=version)
+    quick = JudgeRecipe(TrainingConfig(n_steps=60), TrainingConfig(n_steps=20))
+    judging.train_judges = partial(train_judges, seeds=(0,), recipe=quick)  # type: ignore[attr-defined]
+    request = RunRequest({"tiny": None}, out, store, METHODS, profile="smoke", jobs=1)
+    return run(request, lambda *_: None)
+
+
+if __name__ == "__main__":
+    tiny_run(Path(sys.argv[1]), Path(sys.argv[2]), {k: int(v) for k, v in (a.split("=") for a in sys.argv[3:])})
