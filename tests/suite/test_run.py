@@ -45,7 +45,7 @@ def test_a_text_file_and_an_empty_folder_are_no_dataset(tmp_path: Path) -> None:
     folder.mkdir()
     with pytest.raises(BadFile, match="expected a folder or a zip"):
         run(request(tmp_path, data={"bandai-namco": text}), SILENT)
-    with pytest.raises(BadData, match="no file"):
+    with pytest.raises(BadData, match="expected files called like"):
         run(request(tmp_path, data={"bandai-namco": folder}), SILENT)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "text.txt"]
 
