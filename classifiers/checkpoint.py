@@ -53,11 +53,9 @@ class Checkpoint:
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> str:
     """Write a judge file, whole or not at all; returns its digest."""
+    # one entry only: safetensors writes several in an order that changes from run to run
     header = {
-        "format": FORMAT,
-        "kind": checkpoint.kind,
-        "settings": _canonical(checkpoint.settings),
-        "digest": checkpoint.digest,
+        FORMAT: _canonical({"kind": checkpoint.kind, "settings": checkpoint.settings, "digest": checkpoint.digest})
     }
     tensors = {name: tensor.detach().contiguous() for name, tensor in checkpoint.tensors.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -80,15 +78,17 @@ def read_checkpoint(path: Path, kind: str) -> Checkpoint:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
     except (SafetensorError, OSError) as error:
         raise BadCheckpoint(f"{path}: cannot be read as a judge file ({error})") from error
-    if header.get("format") != FORMAT:
-        raise BadCheckpoint(f"{path}: expected a judge file of format {FORMAT}, got {header.get('format', 'none')}")
-    if header.get("kind") != kind:
-        raise BadCheckpoint(f"{path}: expected a judge of kind {kind}, got {header.get('kind')}")
+    if FORMAT not in header:
+        raise BadCheckpoint(f"{path}: expected a judge file of format {FORMAT}, got {', '.join(header) or 'no header'}")
     try:
-        checkpoint = Checkpoint(kind, json.loads(header["settings"]), tensors)
-    except (KeyError, json.JSONDecodeError) as error:
+        facts = json.loads(header[FORMAT])
+        checkpoint = Checkpoint(facts["kind"], facts["settings"], tensors)
+        stored_digest = facts["digest"]
+    except (KeyError, TypeError, json.JSONDecodeError) as error:
         raise BadCheckpoint(f"{path}: its header holds no readable settings") from error
-    if checkpoint.digest != header.get("digest"):
+    if checkpoint.kind != kind:
+        raise BadCheckpoint(f"{path}: expected a judge of kind {kind}, got {checkpoint.kind}")
+    if checkpoint.digest != stored_digest:
         raise BadCheckpoint(
             f"{path}: its bytes give digest {checkpoint.digest}, its header says {header.get('digest')}; "
             "the file was changed or damaged, fetch it again"

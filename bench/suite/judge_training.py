@@ -39,7 +39,7 @@ CENTRE = slice(20, 44)
 """The 24 frames of a window that the auto-encoder reads."""
 
 
-CLASSIFIER_TRAINING = TrainingConfig(n_steps=200, peak_rate=8e-3, weight_decay=0.05)
+CLASSIFIER_TRAINING = TrainingConfig(n_steps=200)
 AUTOENCODER_TRAINING = TrainingConfig(n_steps=1000, batch_size=32, peak_rate=4e-3)
 
 

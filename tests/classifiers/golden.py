@@ -49,7 +49,8 @@ def main() -> None:
         features = stored["features"]
     for folder in sorted(path.parent for path in PRETRAINED.glob("*/card.json")):
         judges = load_judges(folder)
-        np.savez(FOLDER / f"{folder.name}.npz", digest=np.array(judges.digest), **answers(judges, features))
+        arrays = {"digest": np.array(judges.digest), **answers(judges, features)}
+        np.savez(FOLDER / f"{folder.name}.npz", **arrays)  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":

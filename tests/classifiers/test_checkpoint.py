@@ -78,7 +78,7 @@ def test_missing_file_foreign_weights_and_other_kind_are_refused(tmp_path: Path,
         load_classifier(tmp_path / "missing.safetensors")
     foreign = tmp_path / "foreign.safetensors"
     save_file({"weight": torch.zeros(2)}, foreign)
-    with pytest.raises(BadCheckpoint, match="expected a judge file of format stylebench-judge/1, got none"):
+    with pytest.raises(BadCheckpoint, match="expected a judge file of format stylebench-judge/1, got no header"):
         load_classifier(foreign)
     with pytest.raises(BadCheckpoint, match="expected a judge of kind autoencoder, got stgcn"):
         load_encoder(stored)
