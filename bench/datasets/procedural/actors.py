@@ -11,8 +11,8 @@ from bench.arrays import FloatArray
 from bench.datasets.procedural.seeds import generator
 from bench.motion.skeleton import CANONICAL_NAMES, Skeleton, canonical_skeleton
 
-N_ACTORS = 6
-"""Actors of the dataset are ``actor-1`` .. ``actor-6``; any other name is an unseen actor."""
+N_ACTORS = 12
+"""Actors of the dataset are ``actor-1`` .. ``actor-12``; any other name is an unseen actor."""
 ACTORS = tuple(f"actor-{number}" for number in range(1, N_ACTORS + 1))
 
 # Shares of the body height: one row a bone, as offset in the T-pose; left side, mirrored for the right.
@@ -82,7 +82,7 @@ class Actor:
 def make_actor(name: str) -> Actor:
     """The actor of that name; the same name always gives the same body and habits."""
     rng = generator("actor", name)
-    # The dataset's own actors are spread evenly over the range, so that six of them cover it.
+    # The dataset's own actors are spread evenly over the range, so that they cover it.
     share = (ACTORS.index(name) + 0.5) / N_ACTORS if name in ACTORS else float(rng.uniform())
     height_m = 1.55 + 0.35 * share
     legs, trunk, arms, hips, shoulders, foot = 1.0 + rng.uniform(-0.05, 0.05, 6)

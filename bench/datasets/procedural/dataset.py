@@ -26,7 +26,7 @@ CITATION = "Stylebench procedural dataset, version 1"
 
 
 def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
-    """Generate the dataset: every content in every style, 12 takes each by six actors.
+    """Generate the dataset: every content in every style, 12 takes each by 12 actors.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _known_style(style: str) -> str:
 
 ENTRY = DatasetEntry(
     load=load,
-    summary="generated human motion: 10 contents x 8 styles x 12 takes by 6 synthetic actors, with true answers",
+    summary="generated human motion: 10 contents x 8 styles x 12 takes by 12 synthetic actors, with true answers",
     licence=LICENCE,
     citation=CITATION,
     needs_path=False,

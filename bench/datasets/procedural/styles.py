@@ -71,37 +71,37 @@ def combined(manner: Manner, changes: dict[str, float]) -> Manner:
 STYLES: dict[str, Manner] = {
     "neutral": Manner(),
     "angry": Manner(
-        spine=0.10, head=0.06, lean=0.05, arms_out=0.10, elbow=0.30, crouch=0.02,
+        spine=0.075, head=0.045, lean=0.038, arms_out=0.075, elbow=0.225, crouch=0.02,
         step=1.15, lift=1.30, arm=1.30, twist=1.6, bounce=1.3, sway=0.8,
         attack=0.45, tempo=1.10, shoulders=0.14, rock=0.07, tremor=0.010, lag=0.0,
     ),
     "childlike": Manner(
-        spine=-0.03, head=-0.06, arms_out=0.20, elbow=0.10, width=1.1, toe_out=-0.08,
+        spine=-0.022, head=-0.045, arms_out=0.15, elbow=0.075, width=1.1, toe_out=-0.08,
         step=0.92, lift=1.6, arm=1.40, twist=1.3, bounce=2.0, sway=1.4,
         tempo=1.08, bob=0.030, nod=0.07, tilt=0.15, flap=0.16, wobble=0.07, lag=0.07,
     ),
     "depressed": Manner(
-        spine=0.17, head=0.22, lean=0.02, arms_out=-0.04, elbow=-0.08, crouch=0.015,
+        spine=0.128, head=0.165, lean=0.015, arms_out=-0.03, elbow=-0.06, crouch=0.015,
         step=0.72, lift=0.60, arm=0.45, twist=0.45, bounce=0.45, sway=1.1,
         attack=-0.35, tempo=0.88, nod=0.015, lag=0.10,
     ),
     "old": Manner(
-        spine=0.20, head=-0.04, lean=0.04, arms_out=0.05, elbow=0.28, crouch=0.045, width=1.35, toe_out=0.12,
+        spine=0.15, head=-0.03, lean=0.03, arms_out=0.038, elbow=0.21, crouch=0.045, width=1.35, toe_out=0.12,
         step=0.66, lift=0.60, arm=0.60, twist=0.6, bounce=0.7, sway=1.5,
         limp=0.32, tempo=0.88, asymmetry=0.30, drop=0.022, tremor=0.032, lag=0.05,
     ),
     "proud": Manner(
-        spine=-0.12, head=-0.08, lean=-0.02, arms_out=0.14, elbow=0.05, width=1.1, toe_out=0.10,
+        spine=-0.09, head=-0.06, lean=-0.015, arms_out=0.105, elbow=0.038, width=1.1, toe_out=0.10,
         step=1.10, lift=1.15, arm=0.85, twist=0.75, bounce=0.8, sway=0.5,
         attack=0.12, tempo=0.95, rock=-0.075, shoulders=0.02, lag=0.02,
     ),
     "sexy": Manner(
-        spine=-0.04, head=0.0, arms_out=0.10, elbow=0.05, width=0.35, toe_out=0.04,
+        spine=-0.03, head=0.0, arms_out=0.075, elbow=0.038, width=0.35, toe_out=0.04,
         step=1.02, lift=1.05, arm=1.05, twist=1.5, bounce=0.8, sway=2.2,
         attack=-0.12, tempo=0.95, hips=0.16, shoulders=-0.10, tilt=-0.06, lag=0.09,
     ),
     "strutting": Manner(
-        spine=-0.05, head=-0.03, lean=-0.05, arms_out=0.08, elbow=0.12, width=1.15, toe_out=0.10,
+        spine=-0.038, head=-0.022, lean=-0.038, arms_out=0.06, elbow=0.09, width=1.15, toe_out=0.10,
         step=1.05, lift=1.10, arm=1.25, twist=1.2, bounce=1.5, sway=1.3,
         limp=-0.18, tempo=1.0, asymmetry=-0.40, drop=0.030, nod=0.12, shoulders=0.10, rock=0.03, lag=0.06,
     ),
