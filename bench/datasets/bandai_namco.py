@@ -28,7 +28,7 @@ from bench.motion.retarget import to_canonical
 from bench.motion.skeleton_maps import BANDAI_NAMCO
 
 NAME = "bandai-namco"
-READER_VERSION = 1
+READER_VERSION = 2
 UNIT_M, FPS = 0.01, 30.0
 FILE_NAME = re.compile(r"dataset-(?P<set>[12])_(?P<content>[a-z0-9-]+)_(?P<style>[a-z-]+)_(?P<number>\d+)\.bvh")
 MAX_MEMBER_BYTES = 64 * 2**20

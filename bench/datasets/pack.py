@@ -22,14 +22,11 @@ ROTATIONS_FILE, ROOT_FILE, LABELS_FILE = "rotations_wxyz.npy", "root_xyz_m.npy",
 
 def write_pack(folder: Path, takes: Sequence[Take]) -> None:
     """Store takes into an existing, empty folder: two arrays over all frames and one JSON file of labels."""
-    skeletons: list[Skeleton] = []
+    skeletons = {take.clip.skeleton.identity: take.clip.skeleton for take in takes}
+    place = {identity: index for index, identity in enumerate(skeletons)}
     rows: list[dict[str, Any]] = []
     start = 0
     for take in takes:
-        skeleton = next((s for s in skeletons if s is take.clip.skeleton), None)
-        if skeleton is None:
-            skeleton = take.clip.skeleton
-            skeletons.append(skeleton)
         rows.append(
             {
                 "take_id": take.take_id,
@@ -41,7 +38,7 @@ def write_pack(folder: Path, takes: Sequence[Take]) -> None:
                 "fps": take.clip.fps,
                 "start": start,
                 "n_frames": take.clip.n_frames,
-                "skeleton": next(i for i, s in enumerate(skeletons) if s is skeleton),
+                "skeleton": place[take.clip.skeleton.identity],
             }
         )
         start += take.clip.n_frames
@@ -54,7 +51,7 @@ def write_pack(folder: Path, takes: Sequence[Take]) -> None:
             "offsets_m": s.offsets_m.tolist(),
             "virtual": sorted(s.virtual),
         }
-        for s in skeletons
+        for s in skeletons.values()
     ]
     (folder / LABELS_FILE).write_text(json.dumps({"skeletons": stored_skeletons, "takes": rows}))
 

@@ -121,6 +121,11 @@ class Skeleton:
         """Indices of joints that are not virtual."""
         return tuple(j for j, name in enumerate(self.names) if name not in self.virtual)
 
+    @cached_property
+    def identity(self) -> tuple[tuple[str, ...], tuple[int, ...], bytes, frozenset[str]]:
+        """Equal for skeletons that are the same to the last bit; usable as a key."""
+        return self.names, self.parents, self.offsets_m.tobytes(), self.virtual
+
     def same_bones(self, other: Skeleton, tolerance_m: float = 1e-4) -> bool:
         """True where both have the same joints in the same order with offsets equal to ``tolerance_m``."""
         return (

@@ -48,21 +48,15 @@ class Motions:
     @classmethod
     def of(cls, takes: Sequence[Take]) -> Motions:
         """Collect equally long windows."""
-        skeletons: list[Skeleton] = []
-        index = np.empty(len(takes), dtype=np.int32)
-        for i, take in enumerate(takes):
-            skeleton = take.clip.skeleton
-            known = next((k for k, s in enumerate(skeletons) if s is skeleton or s.same_bones(skeleton, 0.0)), None)
-            if known is None:
-                known = len(skeletons)
-                skeletons.append(skeleton)
-            index[i] = known
+        different = {take.clip.skeleton.identity: take.clip.skeleton for take in takes}
+        place = {identity: number for number, identity in enumerate(different)}
+        skeletons = list(different.values())
         return cls(
             np.stack([take.clip.rotations_wxyz for take in takes]).astype(np.float32),
             np.stack([take.clip.root_xyz_m for take in takes]).astype(np.float32),
             np.stack([skeleton.offsets_m for skeleton in skeletons]),
             np.stack([[name in s.virtual for name in s.names] for s in skeletons]),
-            index,
+            np.array([place[take.clip.skeleton.identity] for take in takes], dtype=np.int32),
             np.array([str(take.content) for take in takes]),
             np.array([str(take.style) for take in takes]),
             takes[0].clip.fps,
