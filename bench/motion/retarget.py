@@ -112,8 +112,8 @@ def _skeleton(bvh: BvhMotion, skeleton_map: SkeletonMap, unit_m: float) -> Skele
             offsets[joint] = virtual_offset
         else:
             offsets[joint] = (rest[sources[joint]] - rest[sources[parent]]) * unit_m
-    # Files of one skeleton differ in the last bit; a nanometre later their takes share one.
-    return canonical_skeleton(np.round(offsets, 9), frozenset(skeleton_map.virtual_offsets_m))
+    # Files of one skeleton differ in the last bits; rounded to a picometre, their takes share one.
+    return canonical_skeleton(np.round(offsets, 12), frozenset(skeleton_map.virtual_offsets_m))
 
 
 def _bones(bvh: BvhMotion) -> FloatArray:
