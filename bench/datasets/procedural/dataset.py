@@ -94,7 +94,7 @@ def performed_by(take_id: str, style: str, actor: Actor, key: str = "0") -> Clip
     return render(imitation(performance_of(take_id), actor, key), _known_style(style))
 
 
-def unseen_takes(seed: int = 0, takes_per_cell: int = 3) -> tuple[Take, ...]:
+def unseen_takes(seed: int = 0, takes_per_cell: int = 6) -> tuple[Take, ...]:
     """Takes of every cell by actors that the dataset does not have, for measuring judges."""
     takes = []
     for content in CONTENTS:

@@ -141,20 +141,20 @@ def _person(actor: Actor, rng: np.random.Generator) -> dict[str, float]:
     """Habits of the actor and of the day as changes of manner: postures vary between people as much as with style."""
     habit, day = actor.habits, rng.standard_normal(14)
     return {
-        "spine": 0.035 * habit[0] + 0.042 * day[0],
-        "head": 0.042 * habit[1] + 0.049 * day[1],
-        "lean": 0.0084 * habit[2] + 0.0084 * day[2],
-        "arms_out": 0.028 * habit[3] + 0.035 * day[3],
-        "elbow": 0.056 * habit[4] + 0.07 * day[4],
-        "toe_out": 0.035 * habit[5] + 0.021 * day[5],
-        "crouch": 0.0056 * abs(day[12]),
-        "width": float(np.exp(0.056 * habit[6] + 0.056 * day[6])),
-        "step": float(np.exp(0.021 * habit[7] + 0.035 * day[7])),
-        "lift": float(np.exp(0.042 * day[8])),
-        "arm": float(np.exp(0.042 * habit[8] + 0.056 * day[9])),
-        "twist": float(np.exp(0.042 * habit[9] + 0.056 * day[10])),
-        "bounce": float(np.exp(0.042 * habit[10] + 0.056 * day[11])),
-        "tempo": float(np.exp(0.0245 * habit[11] + 0.042 * day[13])),
+        "spine": 0.028 * habit[0] + 0.034 * day[0],
+        "head": 0.034 * habit[1] + 0.039 * day[1],
+        "lean": 0.007 * habit[2] + 0.007 * day[2],
+        "arms_out": 0.022 * habit[3] + 0.028 * day[3],
+        "elbow": 0.045 * habit[4] + 0.056 * day[4],
+        "toe_out": 0.028 * habit[5] + 0.017 * day[5],
+        "crouch": 0.004 * abs(day[12]),
+        "width": float(np.exp(0.045 * habit[6] + 0.045 * day[6])),
+        "step": float(np.exp(0.017 * habit[7] + 0.028 * day[7])),
+        "lift": float(np.exp(0.034 * day[8])),
+        "arm": float(np.exp(0.034 * habit[8] + 0.045 * day[9])),
+        "twist": float(np.exp(0.034 * habit[9] + 0.045 * day[10])),
+        "bounce": float(np.exp(0.034 * habit[10] + 0.045 * day[11])),
+        "tempo": float(np.exp(0.02 * habit[11] + 0.034 * day[13])),
     }
 
 
