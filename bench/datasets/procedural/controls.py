@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from bench.arrays import FloatArray
 from bench.datasets.procedural.actors import Actor
@@ -28,6 +29,7 @@ FLEXION, ABDUCTION, TWIST, ELBOW, WRIST, CURL = range(6)
 PITCH, SIDE, TURN = range(3)
 FULL_REACH = 0.992
 """Legs never stretch beyond this share of their length, so that the knee never locks."""
+EASE_FRAMES = 4
 _X, _Y, _Z = np.eye(3)
 
 
@@ -130,7 +132,11 @@ def _feet(controls: Controls, actor: Actor) -> tuple[FloatArray, FloatArray]:
 
 
 def _reachable_root(controls: Controls, actor: Actor, pelvis: FloatArray, ankles: FloatArray) -> FloatArray:
-    """Lower the pelvis smoothly to where both feet that bear weight can be reached."""
+    """Lower the pelvis to where both feet that bear weight can be reached, beginning and ending some frames around it.
+
+    The largest drop within ``EASE_FRAMES`` is averaged over as many frames, so the result is smooth in time and never
+    above what can be reached.
+    """
     hips = quat.rotate(pelvis[:, None], actor.skeleton.offsets_m[[LEFT_UP_LEG, RIGHT_UP_LEG]])
     away = ankles - controls.pelvis_m[:, None] - hips
     reach = FULL_REACH * actor.leg_m
@@ -140,8 +146,9 @@ def _reachable_root(controls: Controls, actor: Actor, pelvis: FloatArray, ankles
     heights = np.concatenate([controls.pelvis_m[:, 1:2], highest], axis=1)
     lowest = heights.min(axis=1, keepdims=True)
     soft = lowest[:, 0] - softness_m * np.log(np.exp((lowest - heights) / softness_m).sum(axis=1))
+    drop = maximum_filter1d(controls.pelvis_m[:, 1] - soft, 2 * EASE_FRAMES + 1, mode="nearest")
     root = controls.pelvis_m.copy()
-    root[:, 1] = soft
+    root[:, 1] -= gaussian_filter1d(drop, 0.5 * EASE_FRAMES, radius=EASE_FRAMES, mode="nearest")
     return root
 
 
