@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from bench.datasets.take import Take
@@ -45,7 +45,7 @@ class Task:
         return self.content == self.reference_content
 
     def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
+        return dict(vars(self))
 
 
 MakeTasks = Callable[[Sequence[Take], int, int], list[Task]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ class Setting:
     tasks: tuple[Task, ...]
     pack_folder: Path
 
-    @property
+    @cached_property
     def tasks_digest(self) -> str:
         return digest_of([task.as_dict() for task in self.tasks])
 
