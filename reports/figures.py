@@ -6,6 +6,7 @@ import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -43,6 +44,7 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,
     "svg.hashsalt": "stylebench",
 }
+CAPTION_COLUMNS = 120
 
 
 def _style() -> AbstractContextManager[None]:
@@ -271,4 +273,5 @@ def _judges(table: Table) -> str:
 
 
 def _caption(figure: Figure, text: str) -> None:
-    figure.supxlabel(text, fontsize=7.5, color="#444444", x=0.01, ha="left")
+    wrapped = "\n".join(fill(line, CAPTION_COLUMNS) for line in text.splitlines())
+    figure.supxlabel(wrapped, fontsize=7.5, color="#444444", x=0.01, ha="left")

@@ -8,7 +8,7 @@ import shutil
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -294,7 +294,8 @@ class _RunSetting:
             self.progress("cells", f"{cell.facts.title}: {what} {done}/{total}", -1, -1)
 
         scratch = self.request.out / "logs"
-        return run_job(job, scratch, limits=self.request.limits, listener=listener)[cell.motions_key]
+        outcome = run_job(job, scratch, limits=self.request.limits, listener=listener)[cell.motions_key]
+        return replace(outcome, log=f"{scratch.name}/{outcome.log}") if outcome.log else outcome
 
     def _gather(self, futures: Sequence[Future[Outcome]]) -> list[Outcome]:
         outcomes: list[Outcome] = []

@@ -37,7 +37,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one cell of a job ended."""
+    """How one cell of a job ended; ``log`` names the file beside the job that tells more, where it did not end well."""
 
     status: Status
     reason: str = ""
@@ -57,7 +57,7 @@ def run_job(job: Job, scratch: Path, *, limits: Limits, listener: Listener) -> d
         before = len(outcomes)
         outcomes.update(_run_worker(replace(job, cells=waiting), scratch, log, limits, listener))
         if len(outcomes) == before:
-            outcomes[waiting[0].key] = Outcome("failed", "the worker ended without a word", str(log))
+            outcomes[waiting[0].key] = Outcome("failed", "the worker ended without a word", log.name)
         attempt += 1
     return outcomes
 
@@ -80,7 +80,7 @@ def _run_worker(job: Job, scratch: Path, log: Path, limits: Limits, listener: Li
     finally:
         os.close(write_end)
     try:
-        return _Watch(job, process, str(log), limits, listener).until_end(read_end)
+        return _Watch(job, process, log.name, limits, listener).until_end(read_end)
     finally:
         os.close(read_end)
         _kill_group(process)
@@ -135,7 +135,7 @@ class _Watch:
             case "begin":
                 self.current, self.since = key, time.monotonic()
             case "ok":
-                self.outcomes[key] = Outcome("ok", log=self.log)
+                self.outcomes[key] = Outcome("ok")
             case "failed":
                 self.outcomes[key] = Outcome(message["status"], message["reason"], self.log)
             case "progress":

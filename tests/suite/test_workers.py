@@ -82,7 +82,7 @@ def test_bad_adapter_has_its_own_status(tmp_path: Path, body: str, status: str, 
     found = outcome(tmp_path, body)
     assert found.status == status
     assert reason in found.reason
-    assert Path(found.log).is_file()
+    assert (tmp_path / "logs" / found.log).is_file()
     assert not Store(tmp_path / "store").has("motions", "cell")
 
 
