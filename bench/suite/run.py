@@ -17,6 +17,7 @@ from bench.adapters.loading import AdapterSource, find_adapter, source_from_opti
 from bench.datasets.base import Dataset
 from bench.datasets.table import load_dataset
 from bench.errors import BadConfig
+from bench.metrics import METRICS
 from bench.protocols import PROTOCOLS
 from bench.protocols.base import Protocol
 from bench.suite import assemble
@@ -244,7 +245,7 @@ class _RunSetting:
             real_digest=setting.part_digest("real"),
             protocol_id=setting.protocol.protocol_id,
             window_frames=setting.protocol.window_frames,
-            metrics=setting.protocol.metrics,
+            metrics=tuple((name, METRICS[name].version) for name in setting.protocol.metrics),
             content_labels=setting.dataset.content_labels,
             style_labels=setting.dataset.style_labels,
         )

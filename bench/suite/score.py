@@ -14,7 +14,6 @@ from threadpoolctl import threadpool_limits
 
 from bench.arrays import FloatArray
 from bench.datasets.pack import Pack
-from bench.metrics import METRICS
 from bench.motion.edit import window
 from bench.protocols.base import Task
 from bench.suite.embedding import Embedding
@@ -45,7 +44,8 @@ class ScoreSpec:
     real_digest: str
     protocol_id: str
     window_frames: int
-    metrics: tuple[str, ...]
+    metrics: tuple[tuple[str, int], ...]
+    """names with versions"""
     content_labels: tuple[str, ...]
     style_labels: tuple[str, ...]
 
@@ -94,10 +94,8 @@ class Scorer:
         """Metric name -> score key."""
         spec = self.spec
         return {
-            name: score_key(
-                motions_digest, spec.judges_digest, spec.real_digest, spec.tasks_digest, name, METRICS[name].version
-            )
-            for name in spec.metrics
+            name: score_key(motions_digest, spec.judges_digest, spec.real_digest, spec.tasks_digest, name, version)
+            for name, version in spec.metrics
         }
 
     def missing(self, motions_digest: str) -> list[str]:
