@@ -99,7 +99,7 @@ def interval_bars(table: Table, metric: str | None = None) -> Figure:
         figure, axes = _canvas(7.6, 1.9 + 0.25 * len(rows))
         for place, row in enumerate(rows):
             _draw_interval(axes, place, row, row.estimates[column.key])
-        _floor_line(axes, column, rows)
+        floor = _floor_line(axes, column, rows)
         n_methods = sum(row.section == "methods" for row in rows)
         if 0 < n_methods < len(rows):
             axes.axhline(n_methods - 0.5, color="#999999", linewidth=0.8)
@@ -109,7 +109,7 @@ def interval_bars(table: Table, metric: str | None = None) -> Figure:
         axes.set_axisbelow(True)
         unit = "" if column.unit in ("1", "distance") else f" ({column.unit})"
         axes.set(xlabel=f"{column.title}{unit} {ARROWS[column.better]}", title=_headline(column))
-        axes.legend(handles=_legend(rows), loc="best", frameon=True, framealpha=0.9, edgecolor="none")
+        axes.legend(handles=[*_legend(rows), *floor], loc="best", frameon=True, framealpha=0.9, edgecolor="none")
         _caption(figure, f"{table.title}\n{_samples(table, column, rows)}. {_judges(table)}.")
     return figure
 
@@ -225,19 +225,15 @@ def _draw_interval(axes: Axes, place: int, row: TableRow, found: Estimate) -> No
     )
 
 
-def _floor_line(axes: Axes, column: Column, rows: Sequence[TableRow]) -> None:
+def _floor_line(axes: Axes, column: Column, rows: Sequence[TableRow]) -> list[Line2D]:
+    """A dotted line at the floor, returned for the legend; nothing where the number has no floor."""
     floors = [row.estimates[column.key].floor for row in rows]
     known = [floor for floor in floors if floor is not None]
-    if known:
-        axes.axvline(max(known), color="#000000", linewidth=0.9, linestyle=":")
-        axes.annotate(
-            f"floor {number(max(known), column.unit)}",
-            (max(known), 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(2.0, 1.0),
-            textcoords="offset points",
-            fontsize=7.0,
-        )
+    if not known:
+        return []
+    line = axes.axvline(max(known), color="#000000", linewidth=0.9, linestyle=":", zorder=0)
+    line.set_label(f"floor: real against real {number(max(known), column.unit)}")
+    return [line]
 
 
 def _headline(column: Column) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -32,7 +33,8 @@ def place_labels(axes: Axes, points: NDArray[np.float64], labels: Sequence[Annot
     for index in _crowded_first(places):
         extent = labels[index].get_window_extent()
         size = (extent.width + 2.0 * scale, extent.height + 1.0 * scale)
-        offset = min(_offsets(), key=lambda o: _cost(places[index], o, size, scale, frame, taken, marks))
+        others = marks[:index] + marks[index + 1 :]
+        offset = min(_offsets(), key=partial(_cost, places[index], size, scale, frame, taken, others))
         taken.append(_box(places[index], offset, size, scale))
         _move(labels[index], offset)
 
@@ -67,18 +69,27 @@ def _alignment(offset: tuple[float, float]) -> tuple[str, str]:
 
 def _cost(
     place: NDArray[np.float64],
-    offset: tuple[float, float],
     size: tuple[float, float],
     scale: float,
     frame: Bbox,
     taken: Sequence[Bbox],
     marks: Sequence[Bbox],
+    offset: tuple[float, float],
 ) -> float:
     box = _box(place, offset, size, scale)
     inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
     covered = sum(_overlap(box, other) for other in taken)
     hidden = sum(_overlap(box, other) for other in marks)
-    return 100.0 * covered + 30.0 * hidden + (0.0 if inside else 1e6) + scale * scale * float(np.hypot(*offset))
+    crossed = sum(_crosses(place, np.multiply(offset, scale), other) for other in taken)
+    cost = 100.0 * covered + 30.0 * hidden + 2000.0 * crossed + (0.0 if inside else 1e6)
+    return cost + scale * scale * float(np.hypot(*offset))
+
+
+def _crosses(place: NDArray[np.float64], offset: NDArray[np.float64], box: Bbox) -> bool:
+    """Whether the line from a point to its label runs through another label."""
+    steps = place + np.linspace(0.0, 1.0, 17)[:, None] * offset
+    inside = (steps > (box.x0, box.y0)) & (steps < (box.x1, box.y1))
+    return bool(np.any(np.all(inside, axis=1)))
 
 
 def _overlap(a: Bbox, b: Bbox) -> float:
