@@ -67,15 +67,25 @@ def recognition_scatter(table: Table) -> Figure:
     if not rows:
         raise BadRecord(f"{table.title}: no row has content and style recognition to draw")
     with _style():
-        figure, axes = _canvas(7.6, 7.4)
+        figure, axes = _canvas(8.2, 7.0)
         _iso_hint(axes)
         points = np.array([[_value(row, content), _value(row, style)] for row in rows], dtype=np.float64)
         fill = [_value(row, joint) for row in rows]
         _draw_points(figure, axes, rows, points, [np.nan if value is None else value for value in fill])
-        axes.set(xlim=(-5.0, 105.0), ylim=(-5.0, 105.0), xlabel="content recognition CRA (%)")
+        # Room on the right, where the labels of the best rows go.
+        axes.set(xlim=(-5.0, 122.0), ylim=(-5.0, 106.0), xticks=range(0, 101, 20), xlabel="content recognition CRA (%)")
         axes.set(ylabel="style recognition SRA (%)", title="Who gets content and style right")
         axes.set_aspect("equal")
-        axes.legend(handles=_legend(rows), loc="lower left", frameon=True, framealpha=0.9, edgecolor="none")
+        # Above the axes: every place inside may hold points.
+        axes.legend(
+            handles=_legend(rows),
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=3,
+            fontsize=8.0,
+            frameon=False,
+            borderaxespad=0.2,
+        )
         _caption(figure, f"{table.title}\n{_samples(table, content, rows)}. {_judges(table)}.")
         figure.draw_without_rendering()
         place_labels(axes, points, [_annotate(axes, row, point) for row, point in zip(rows, points, strict=True)])

@@ -3,108 +3,103 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.text import Annotation
-from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 RADII_PT = (8.0, 14.0, 22.0, 32.0, 44.0, 58.0, 74.0, 92.0)
 N_DIRECTIONS = 16
 POINT_RADIUS_PT = 5.0
+LINE_STEPS = np.linspace(0.0, 1.0, 17)
+
+Floats = NDArray[np.float64]
 
 
-def place_labels(axes: Axes, points: NDArray[np.float64], labels: Sequence[Annotation]) -> None:
+def place_labels(axes: Axes, points: Floats, labels: Sequence[Annotation]) -> None:
     """Move each annotation to the best free place near its point (``points`` ``[m, 2]``, data coordinates).
 
     Greedy: points with the nearest neighbours are served first; every label tries rings of growing radius and takes
-    the place with the least cost, where covering a label or leaving the axes costs most, then covering a point, then
-    distance. Labels far from their point keep a thin line to it.
+    the place with the least cost, where leaving the axes costs most, then covering a label, then a line through a
+    label, then covering a point, then distance. Labels far from their point keep a thin line to it.
     """
     if not labels:
         return
     scale = axes.figure.dpi / 72.0
     places = np.asarray(axes.transData.transform(points), dtype=np.float64)
-    marks = [_around(place, POINT_RADIUS_PT * scale) for place in places]
-    frame = axes.get_window_extent()
-    taken: list[Bbox] = []
+    radius = POINT_RADIUS_PT * scale
+    marks = np.concatenate([places - radius, places + radius], axis=1)
+    frame = np.asarray(axes.get_window_extent().extents, dtype=np.float64)
+    offsets, taken, lines_taken = _offsets(), np.empty((0, 4)), np.empty((0, len(LINE_STEPS), 2))
     for index in _crowded_first(places):
         extent = labels[index].get_window_extent()
-        size = (extent.width + 2.0 * scale, extent.height + 1.0 * scale)
-        others = marks[:index] + marks[index + 1 :]
-        offset = min(_offsets(), key=partial(_cost, places[index], size, scale, frame, taken, others))
-        taken.append(_box(places[index], offset, size, scale))
-        _move(labels[index], offset)
+        size = np.array([extent.width + 2.0 * scale, extent.height + 1.0 * scale])
+        boxes = _boxes(places[index], offsets * scale, size)
+        lines = places[index] + LINE_STEPS[:, None] * offsets[:, None] * scale
+        cost = (
+            1e6 * _leaves(boxes, frame)
+            + 100.0 * _overlaps(boxes, taken)
+            + 30.0 * _overlaps(boxes, np.delete(marks, index, axis=0))
+            + 2000.0 * (_crosses(lines, taken).sum(axis=1) + _crosses(lines_taken, boxes).sum(axis=0))
+            + scale**2 * np.repeat(RADII_PT, N_DIRECTIONS)
+        )
+        best = int(np.argmin(cost))
+        taken = np.vstack([taken, boxes[best]])
+        lines_taken = np.concatenate([lines_taken, lines[best : best + 1]])
+        _move(labels[index], offsets[best])
 
 
-def _crowded_first(places: NDArray[np.float64]) -> list[int]:
+def _crowded_first(places: Floats) -> list[int]:
     gaps = np.linalg.norm(places[:, None] - places[None], axis=2)
-    near = np.sort(gaps, axis=1)[:, 1:5].sum(axis=1) if len(places) > 1 else np.zeros(len(places))
+    near = np.sort(gaps, axis=1)[:, 1:5].sum(axis=1)
     return [int(index) for index in np.argsort(near, kind="stable")]
 
 
-def _offsets() -> list[tuple[float, float]]:
+def _offsets() -> Floats:
+    """Candidate offsets in points ``[k, 2]``, nearest first."""
     angles = np.arange(N_DIRECTIONS) * 2.0 * np.pi / N_DIRECTIONS
-    return [(float(radius * np.cos(a)), float(radius * np.sin(a))) for radius in RADII_PT for a in angles]
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.concatenate([radius * directions for radius in RADII_PT])
 
 
-def _box(place: NDArray[np.float64], offset: tuple[float, float], size: tuple[float, float], scale: float) -> Bbox:
-    """Where a label of ``size`` lies: it grows away from the point, sideways and up or down."""
-    x, y = place[0] + offset[0] * scale, place[1] + offset[1] * scale
-    horizontal, vertical = _alignment(offset)
-    left = {"left": x, "center": x - size[0] / 2.0, "right": x - size[0]}[horizontal]
-    bottom = {"bottom": y, "center": y - size[1] / 2.0, "top": y - size[1]}[vertical]
-    return Bbox.from_bounds(left, bottom, *size)
+def _sides(offsets: Floats) -> NDArray[np.intp]:
+    """-1, 0 or 1 per axis ``[..., 2]``: whether a label grows down or left, is centred, or grows up or right."""
+    length = np.linalg.norm(offsets, axis=-1, keepdims=True)
+    return np.where(np.abs(offsets) < 0.3 * length, 0, np.sign(offsets)).astype(np.intp)
 
 
-def _alignment(offset: tuple[float, float]) -> tuple[str, str]:
-    x, y = offset
-    length = float(np.hypot(x, y))
-    horizontal = "center" if abs(x) < 0.3 * length else "left" if x > 0 else "right"
-    vertical = "center" if abs(y) < 0.3 * length else "bottom" if y > 0 else "top"
-    return horizontal, vertical
+def _boxes(place: Floats, offsets: Floats, size: Floats) -> Floats:
+    """Where a label of ``size`` would lie: ``[k, 4]`` left, bottom, right, top; it grows away from the point."""
+    corners = place + offsets + (_sides(offsets) - 1) / 2.0 * size
+    return np.concatenate([corners, corners + size], axis=1)
 
 
-def _cost(
-    place: NDArray[np.float64],
-    size: tuple[float, float],
-    scale: float,
-    frame: Bbox,
-    taken: Sequence[Bbox],
-    marks: Sequence[Bbox],
-    offset: tuple[float, float],
-) -> float:
-    box = _box(place, offset, size, scale)
-    inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
-    covered = sum(_overlap(box, other) for other in taken)
-    hidden = sum(_overlap(box, other) for other in marks)
-    crossed = sum(_crosses(place, np.multiply(offset, scale), other) for other in taken)
-    cost = 100.0 * covered + 30.0 * hidden + 2000.0 * crossed + (0.0 if inside else 1e6)
-    return cost + scale * scale * float(np.hypot(*offset))
+def _leaves(boxes: Floats, frame: Floats) -> NDArray[np.bool_]:
+    inside = np.all(boxes[:, :2] >= frame[:2], axis=1) & np.all(boxes[:, 2:] <= frame[2:], axis=1)
+    return np.asarray(~inside)
 
 
-def _crosses(place: NDArray[np.float64], offset: NDArray[np.float64], box: Bbox) -> bool:
-    """Whether the line from a point to its label runs through another label."""
-    steps = place + np.linspace(0.0, 1.0, 17)[:, None] * offset
-    inside = (steps > (box.x0, box.y0)) & (steps < (box.x1, box.y1))
-    return bool(np.any(np.all(inside, axis=1)))
+def _overlaps(boxes: Floats, others: Floats) -> Floats:
+    """Area of each of ``boxes`` ``[k, 4]`` that lies on any of ``others`` ``[m, 4]``: ``[k]``."""
+    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
+    return np.asarray(np.maximum(high - low, 0.0).prod(axis=2).sum(axis=1))
 
 
-def _overlap(a: Bbox, b: Bbox) -> float:
-    width = min(a.x1, b.x1) - max(a.x0, b.x0)
-    height = min(a.y1, b.y1) - max(a.y0, b.y0)
-    return float(width * height) if width > 0.0 and height > 0.0 else 0.0
+def _crosses(lines: Floats, boxes: Floats) -> NDArray[np.bool_]:
+    """Which lines, sampled as ``[k, steps, 2]``, run through which of ``boxes`` ``[m, 4]``: ``[k, m]``."""
+    steps = lines[:, :, None]
+    inside = np.all((steps > boxes[:, :2]) & (steps < boxes[:, 2:]), axis=3)
+    return np.asarray(inside.any(axis=1))
 
 
-def _around(place: NDArray[np.float64], radius: float) -> Bbox:
-    return Bbox.from_bounds(place[0] - radius, place[1] - radius, 2.0 * radius, 2.0 * radius)
-
-
-def _move(label: Annotation, offset: tuple[float, float]) -> None:
-    horizontal, vertical = _alignment(offset)
-    label.set_position(offset)
-    label.set(horizontalalignment=horizontal, verticalalignment=vertical)
+def _move(label: Annotation, offset: Floats) -> None:
+    across, up = _sides(offset)
+    label.set_position((float(offset[0]), float(offset[1])))
+    label.set(
+        horizontalalignment=("center", "left", "right")[across],
+        verticalalignment=("center", "bottom", "top")[up],
+    )
     if label.arrow_patch is not None:
         label.arrow_patch.set_visible(float(np.hypot(*offset)) > 1.5 * RADII_PT[0])
