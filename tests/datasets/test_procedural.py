@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from bench.datasets.procedural.actors import ACTORS, make_actor
 from bench.datasets.procedural.dataset import TAKES_PER_CELL, digest, load, performance_of
 from bench.datasets.procedural.performance import CONTENTS, render
 from bench.datasets.procedural.styles import STYLES
-from bench.errors import BadInput
+from bench.errors import BadConfig, BadInput
 from bench.motion import quat
 from bench.motion.clip import Clip
 from bench.motion.edit import window
@@ -60,6 +62,9 @@ def test_motion_is_smooth(take_id: str) -> None:
     assert np.linalg.norm(acceleration, axis=-1).max() < 40.0
     turns = quat.angle_between(clip.rotations_wxyz[1:], clip.rotations_wxyz[:-1])
     assert turns.max() < 1.0
+    assert np.isfinite(clip.rotations_wxyz).all() and np.isfinite(clip.root_xyz_m).all()
+    # The same turn has two quaternions; neighbouring frames use the same one.
+    assert np.sum(clip.rotations_wxyz[1:] * clip.rotations_wxyz[:-1], axis=-1).min() > 0.0
 
 
 @pytest.mark.parametrize("take_id", SOME)
@@ -92,6 +97,16 @@ def test_generation_is_deterministic_and_stays_what_it_is() -> None:
     assert digest() == DIGEST
 
 
+def test_the_digest_changes_with_any_parameter_of_a_style_or_content(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setitem(STYLES, "old", replace(STYLES["old"], limp=0.33))
+        assert digest() != DIGEST
+    with monkeypatch.context() as patch:
+        patch.setitem(CONTENTS, "walk", replace(CONTENTS["walk"], cycles_per_s=0.93))
+        assert digest() != DIGEST
+    assert digest() == DIGEST
+
+
 def test_actors_differ_in_body_and_are_who_they_are() -> None:
     statures = [make_actor(name).skeleton.stature_m for name in ACTORS]
     assert max(statures) - min(statures) > 0.15
@@ -118,6 +133,13 @@ def test_unknown_takes_are_refused(take_id: str) -> None:
         performance_of(take_id)
     with pytest.raises(BadInput, match="unknown style 'grumpy'"):
         true_answer("walk_neutral_001", 0, 10, "grumpy")
+
+
+def test_a_window_outside_the_take_and_a_path_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput):
+        true_answer("walk_neutral_001", 100, 1000, "old")
+    with pytest.raises(BadConfig, match="takes no path"):
+        load(tmp_path)
 
 
 @pytest.mark.slow
