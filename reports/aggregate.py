@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from reports.bootstrap import interval
 from reports.records import BadRecord, Better, Measurement
 from reports.rows import Row, StoredRecord, check_comparable, groups, load_run, rows_of
-from reports.significance import Difference, holm, leader_ranks, mean_and_sd, pareto_front, replicate_difference
+from reports.significance import (
+    SIGNIFICANCE,
+    Difference,
+    holm,
+    leader_ranks,
+    mean_and_sd,
+    pareto_front,
+    replicate_difference,
+)
 
 __all__ = [
     "Estimate",
@@ -34,8 +42,6 @@ __all__ = [
     "tie_groups",
     "variance_split",
 ]
-
-SIGNIFICANCE = 0.05
 
 
 @dataclass(frozen=True)

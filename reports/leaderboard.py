@@ -154,7 +154,7 @@ def _runs(stored: Sequence[StoredRecord]) -> list[str]:
         made = record.provenance
         commit = made.commit[:12] + (" with uncommitted changes" if made.dirty else "")
         machine = f"{made.gpu or made.cpu}, {made.threads} thread{'s' if made.threads != 1 else ''}"
-        found.setdefault((one_line(made.command), commit, machine), []).append(record)
+        found.setdefault((one_line(made.command).replace("`", "'"), commit, machine), []).append(record)
     items = []
     for (command, commit, machine), records in sorted(found.items()):
         wall = duration(sum(record.provenance.wall_s for record in records))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import math
 import os
@@ -263,7 +264,8 @@ def read_samples(record_path: Path, record: Record) -> dict[str, NDArray[Any]]:
     """
     path = samples_path(record_path)
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        # From memory: numpy leaves the file open where it is no archive.
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise BadRecord(f"{path}: samples file cannot be read: {error}") from error

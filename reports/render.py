@@ -42,14 +42,25 @@ def render(table: Table, form: Format, part: Part = "main") -> str:
 def text_frame(table: Table, part: Part = "main") -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Cells as plain text, one line per row of the table in its order, and the footnotes they point to.
 
-    Columns: rank, row, the columns of ``part`` by their headers, notes. An undefined cell is ``–[a]`` and footnote a
-    says why; ``84.7[b]`` carries a warning. Nothing is escaped.
+    Columns: rank, row, the columns of ``part`` by their headers, n of the primary column, notes. An undefined cell is
+    ``–[a]`` and footnote a says why; ``84.7[b]`` carries a warning. Nothing is escaped.
     """
     reasons: list[str] = []
-    lines = [[_rank_text(row), row.title, *_cells(table, part, row, reasons), _notes(row)] for row in table.rows]
-    headers = ["rank", "row", *(column.header for column in table.columns_of(part)), "notes"]
+    lines = [
+        [_rank_text(row), row.title, *_cells(table, part, row, reasons), _n_text(table, row), _notes(row)]
+        for row in table.rows
+    ]
     notes = tuple(f"[{footnote_mark(place)}] {reason}" for place, reason in enumerate(reasons))
-    return pd.DataFrame(lines, columns=pd.Index(headers), dtype=str), notes
+    return pd.DataFrame(lines, columns=pd.Index(_headers(table, part)), dtype=str), notes
+
+
+def _headers(table: Table, part: Part) -> list[str]:
+    return ["rank", "row", *(column.header for column in table.columns_of(part)), "n", "notes"]
+
+
+def _n_text(table: Table, row: TableRow) -> str:
+    found = row.estimates.get(table.primary.key) if table.primary else None
+    return UNDEFINED if found is None else str(found.n)
 
 
 def _rank_text(row: TableRow) -> str:
@@ -126,18 +137,19 @@ def sections(table: Table, part: Part = "main") -> tuple[list[tuple[Section, pd.
     """Frames of cells by section, empty sections left out, and the footnotes of them all.
 
     The floors are the last line of the anchors (of the methods, where there are no anchors). Only methods have a rank.
+    What did not finish is told in the main part only.
     """
     frame, notes = text_frame(table, part)
     floors = floor_cells(table, part)
     found: list[tuple[Section, pd.DataFrame]] = []
     for section in SECTION_TITLES:
         inside = [row.section == section for row in table.rows]
-        if any(inside):
+        if any(inside) and (part == "main" or section != "unfinished"):
             found.append((section, frame[inside].reset_index(drop=True)))
     if floors is not None and found:
         place = max((at for at, (section, _) in enumerate(found) if section != "unfinished"), default=0)
         section, chosen = found[place]
-        line = pd.DataFrame([["", FLOOR_TITLE, *floors, ""]], columns=chosen.columns)
+        line = pd.DataFrame([["", FLOOR_TITLE, *floors, "", ""]], columns=chosen.columns)
         found[place] = (section, pd.concat([chosen, line], ignore_index=True))
     return [(section, _without_empty_rank(section, chosen)) for section, chosen in found], notes
 
@@ -194,7 +206,7 @@ def to_latex(table: Table, part: Part = "main") -> str:
     Needs ``\\usepackage{booktabs}``.
     """
     found, notes = sections(table, part)
-    headers = ["rank", "row", *(column.header for column in table.columns_of(part)), "notes"]
+    headers = _headers(table, part)
     form = "".join("l" if name in ("row", "notes") else "r" for name in headers)
     lines = [f"\\begin{{tabular}}{{{form}}}", r"\toprule", _latex_line(headers)]
     for section, frame in found:
@@ -220,7 +232,7 @@ def _latex_line(cells: Sequence[str]) -> str:
 def to_html(table: Table, part: Part = "main") -> str:
     """A ``<table>`` element with sections as row groups and the footnotes below; style is left to the page."""
     found, notes = sections(table, part)
-    headers = ["rank", "row", *(column.header for column in table.columns_of(part)), "notes"]
+    headers = _headers(table, part)
     groups = [
         (SECTION_TITLES[section], frame.reindex(columns=headers, fill_value="").to_numpy().tolist())
         for section, frame in found

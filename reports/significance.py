@@ -13,6 +13,7 @@ from scipy import stats
 from reports.bootstrap import interval
 
 LEVEL = 0.95
+SIGNIFICANCE = 0.05
 
 
 @dataclass(frozen=True)

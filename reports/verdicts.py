@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from reports.aggregate import SIGNIFICANCE, paired_difference
+from reports.aggregate import paired_difference
 from reports.formatting import escape_markdown, number
-from reports.significance import holm
+from reports.significance import SIGNIFICANCE, holm
 from reports.tables import Column, Table, TableRow
 
 CEILING_ROWS = ("real-test", "real-disjoint", "label-oracle", "procedural-truth")
@@ -23,11 +23,11 @@ class Verdict:
     leaders: tuple[TableRow, ...]
     """methods of rank 1"""
     transfers: tuple[TableRow, ...]
-    """ranked methods separably better than every row that does nothing"""
+    """ranked methods separably better than every row that does nothing and than the best simple trick"""
+    like_a_trick: tuple[TableRow, ...]
+    """ranked methods separably better than every row that does nothing, but not than the trick"""
     does_nothing: tuple[TableRow, ...]
-    """ranked methods that are not"""
-    below_trick: tuple[TableRow, ...]
-    """ranked methods that are not separably better than the best simple trick"""
+    """the other ranked methods"""
     trick: TableRow | None
     """the best anchor that neither is real motion nor does nothing nor copies"""
     copying_methods: tuple[TableRow, ...]
@@ -57,9 +57,9 @@ def verdict_of(table: Table) -> Verdict:
     above_trick = _better_than_all(table.primary, ranked, tricks[:1])
     return Verdict(
         leaders=tuple(row for row in ranked if row.rank == 1),
-        transfers=tuple(row for row in ranked if row in above_nothing),
+        transfers=tuple(row for row in above_nothing if row in above_trick),
+        like_a_trick=tuple(row for row in above_nothing if row not in above_trick),
         does_nothing=tuple(row for row in ranked if row not in above_nothing),
-        below_trick=tuple(row for row in ranked if row not in above_trick) if tricks else (),
         trick=tricks[0] if tricks else None,
         copying_methods=tuple(row for row in table.of("anchors") if row.row.method.kind == "method"),
         copying_anchors=tuple(row for row in anchors if row.row.copies),
@@ -92,16 +92,21 @@ def sentences(table: Table) -> list[str]:
     verdict = verdict_of(table)
     said = [_leading(table, column, verdict)]
     if verdict.transfers:
-        said.append(f"**Really transfer style** (separably above every do-nothing row): {_names(verdict.transfers)}.")
+        said.append(f"**Really transfer style** ({_beaten(verdict)}): {_names(verdict.transfers)}.")
+    if verdict.trick is not None and verdict.like_a_trick:
+        trick = f"{escape_markdown(verdict.trick.title)} ({_value(column, verdict.trick)})"
+        said.append(f"**Do something, but not more than a simple trick**, {trick}: {_names(verdict.like_a_trick)}.")
     if verdict.does_nothing:
         said.append(f"**Not separable from doing nothing:** {_names(verdict.does_nothing)}.")
-    if verdict.trick is not None and verdict.below_trick:
-        trick = f"{escape_markdown(verdict.trick.title)} ({_value(column, verdict.trick)})"
-        said.append(f"**Not better than a simple trick**, {trick}: {_names(verdict.below_trick)}.")
     if verdict.copying_methods:
         said.append(f"**Only copy** (no rank, whatever they score): {_names(verdict.copying_methods)}.")
     said.append(_scale(table, column))
     return [sentence for sentence in said if sentence]
+
+
+def _beaten(verdict: Verdict) -> str:
+    every = "separably above every do-nothing row"
+    return every if verdict.trick is None else f"{every} and the best simple trick"
 
 
 def _leading(table: Table, column: Column, verdict: Verdict) -> str:

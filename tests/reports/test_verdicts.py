@@ -1,0 +1,101 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports.records import BadRecord, samples_path
+from reports.render import render, text_frame
+from reports.rows import load_run
+from reports.tables import Table, TableRow, tables_of_run
+from reports.verdicts import is_one_of, sentences, verdict_of
+from tests.reports.factory import ANCHORS, METHODS, FakeMethod, FakeTasks, make_row, write_row, write_run
+
+TASKS = FakeTasks(n=400, n_clusters=80)
+IDLE = FakeMethod("idle", "Idle", content_right=90.0, style_right=2.0, joint=1.0, copied_share=20.0)
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Table:
+    [found] = tables_of_run(write_run(tmp_path_factory.mktemp("run"), (*ANCHORS, *METHODS, IDLE), TASKS))
+    return found
+
+
+def names(rows: tuple[TableRow, ...]) -> set[str]:
+    return {row.row.method.name for row in rows}
+
+
+def test_each_ranked_method_gets_one_verdict(table: Table) -> None:
+    verdict = verdict_of(table)
+    assert names(verdict.transfers) >= {"park2021", "style_erd"}
+    assert "mason2022" in names(verdict.like_a_trick)
+    assert names(verdict.does_nothing) == {"idle"}
+    assert names(verdict.copying_methods) == {"cheater"}
+    ranked = [row for row in table.of("methods") if row.rank is not None]
+    assert len(ranked) == len(verdict.transfers) + len(verdict.like_a_trick) + len(verdict.does_nothing)
+
+
+def test_the_trick_neither_copies_nor_idles_nor_is_real(table: Table) -> None:
+    trick = verdict_of(table).trick
+    assert trick is not None and trick.row.method.name == "style-mean-shift"
+
+
+def test_sentences_name_leaders_copiers_and_the_scale(table: Table) -> None:
+    said = "\n".join(sentences(table))
+    assert "**Leads** on joint recognition (a tie" in said
+    assert "**Only copy** (no rank, whatever they score): Cheater." in said
+    assert "**Not separable from doing nothing:** Idle." in said
+    assert "real motion" in said and "the best simple trick (style mean-shift)" in said
+
+
+def test_a_table_of_anchors_only_says_so(tmp_path: Path) -> None:
+    [found] = tables_of_run(write_run(tmp_path, ANCHORS, FakeTasks(n=60, n_clusters=12)))
+    assert sentences(found)[0].startswith("No method is ranked in this table yet")
+
+
+def test_a_table_without_any_number_still_prints(tmp_path: Path) -> None:
+    [found] = tables_of_run(write_run(tmp_path, METHODS[-1:], FakeTasks(n=60, n_clusters=12)))
+    assert sentences(found) == ["No row of this table has finished."]
+    assert "no answer within 60 s" in render(found, "md") and "timeout" in render(found, "csv")
+
+
+def test_families_of_names() -> None:
+    assert is_one_of("noise-0.1", ("noise",)) and is_one_of("real-test+park-ik", ("real-test",))
+    assert not is_one_of("noisenet", ("noise",))
+
+
+def test_every_row_says_its_n(table: Table) -> None:
+    frame, _ = text_frame(table)
+    assert set(frame["n"]) == {"320", "–"}
+
+
+def test_profiles_and_datasets_are_tables_of_their_own(tmp_path: Path) -> None:
+    small = FakeTasks(n=60, n_clusters=12)
+    for dataset, profile in (("a@1", "quick"), ("a@1", "standard"), ("b@1", "quick")):
+        write_row(tmp_path, *make_row(METHODS[0], small, dataset=dataset, profile=profile))
+    assert [(t.key.dataset, t.key.profile) for t in tables_of_run(tmp_path)] == [
+        ("a@1", "quick"),
+        ("a@1", "standard"),
+        ("b@1", "quick"),
+    ]
+
+
+def test_the_same_cell_twice_is_refused(tmp_path: Path) -> None:
+    record, arrays = make_row(METHODS[0], FakeTasks(n=60, n_clusters=12))
+    write_row(tmp_path / "one", record, arrays)
+    write_row(tmp_path / "two", record.model_copy(update={"key": "other"}), arrays)
+    with pytest.raises(BadRecord, match="is there twice"):
+        tables_of_run(tmp_path)
+
+
+def test_a_samples_file_that_is_no_archive_is_refused(tmp_path: Path) -> None:
+    path = write_row(tmp_path, *make_row(METHODS[0], FakeTasks(n=60, n_clusters=12)))
+    samples_path(path).write_bytes(b"PK\x03\x04 but not really")
+    with pytest.raises(BadRecord, match="samples file cannot be read"):
+        tables_of_run(tmp_path)
+
+
+def test_a_json_file_that_is_no_record_is_named(tmp_path: Path) -> None:
+    (tmp_path / "notes.json").write_text("{}")
+    with pytest.raises(BadRecord, match=r"notes\.json: not a record"):
+        load_run(tmp_path)
