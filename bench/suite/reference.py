@@ -25,8 +25,9 @@ from bench.suite.setting import Setting
 from reports.bootstrap import cluster_counts
 from reports.records import digest_of
 
-REFERENCE_VERSION = 1
-REAL_STRIDE_FRAMES = 32
+REFERENCE_VERSION = 2
+REAL_STRIDE_FRAMES = 16
+JUDGE_STRIDE_FRAMES = 32
 CONDITIONAL_COMPONENTS = 16
 
 Embed = Callable[[Motions], Embedding]
@@ -47,12 +48,12 @@ def reference_key(setting: Setting, judges_digest: str) -> str:
 
 def build_reference(setting: Setting, embed: Embed, folder: Path) -> dict[str, Any]:
     """Compute a reference and store its arrays into an empty folder."""
-    real = windows_of(setting.part("real"))
+    real = windows_of(setting.part("real"), REAL_STRIDE_FRAMES)
     floor = _floor_windows(setting)
-    judge_part = embed(windows_of(setting.part("judge")))
+    judge_part = embed(windows_of(setting.part("judge"), JUDGE_STRIDE_FRAMES))
     fit_bank = DescriptorBank.of(setting.part("fit"), 1)
     test_bank = DescriptorBank.of(setting.part("test"), 1)
-    test_windows = windows_of(setting.part("test")).window_features()[..., :3]
+    test_windows = windows_of(setting.part("test"), JUDGE_STRIDE_FRAMES).window_features()[..., :3]
     threshold = copy_threshold(fit_bank.nearest(pose_descriptors(test_windows)))
     jerk = jerk_per_sample(floor.world_positions(), floor.fps, joints=_real_joints(floor))
     for name, motions in (("real", real), ("floor", floor)):
@@ -119,11 +120,9 @@ def load_reference(
     )
 
 
-def windows_of(takes: Sequence[Take]) -> Motions:
-    """All 64-frame windows of some takes, every 32 frames."""
-    return Motions.of(
-        [take.with_clip(part) for take in takes for _, part in windows(take.clip, stride=REAL_STRIDE_FRAMES)]
-    )
+def windows_of(takes: Sequence[Take], stride_frames: int) -> Motions:
+    """All 64-frame windows of some takes, one every ``stride_frames``."""
+    return Motions.of([take.with_clip(part) for take in takes for _, part in windows(take.clip, stride=stride_frames)])
 
 
 def label_indices(labels: Iterable[str], known: Sequence[str]) -> IntArray:
