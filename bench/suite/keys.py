@@ -80,15 +80,18 @@ def embed_key(motions: str, judges: str) -> str:
     return digest_of({"stage": "embed", "motions": motions, "judges": judges})
 
 
-def score_key(motions: str, judges: str, real_part: str, tasks: str, metric: str, version: int) -> str:
-    """Key of one metric of a set of motions."""
+def score_key(motions: str, reference: str, given: bool, metric: str, version: int) -> str:
+    """Key of one metric of a set of motions.
+
+    ``reference`` is the key of what the motions are scored against: dataset, split, tasks, judges and the version of
+    the way it is built. ``given`` says whether source and style reference count as motion the method was given.
+    """
     return digest_of(
         {
             "stage": "score",
             "motions": motions,
-            "judges": judges,
-            "real": real_part,
-            "tasks": tasks,
+            "reference": reference,
+            "given": given,
             "metric": metric,
             "version": version,
         }

@@ -242,7 +242,6 @@ class _RunSetting:
             judges_folder=str(self.judges.folder),
             judges_digest=judges.digest,
             reference_key=reference_key(setting, judges.digest),
-            real_digest=setting.part_digest("real"),
             protocol_id=setting.protocol.protocol_id,
             window_frames=setting.protocol.window_frames,
             metrics=tuple((name, METRICS[name].version) for name in setting.protocol.metrics),
@@ -271,7 +270,7 @@ class _RunSetting:
                 return outcome
             self.generated += 1
         digest = str(self.store.facts("motions", cell.motions_key)["motions_digest"])
-        if self.scorer.missing(digest):
+        if self.scorer.missing(digest, cell.given):
             self.scored += len(pool.submit(score_in_process, self.spec, cell.motions_key, cell.given).result())
         return Outcome("ok")
 
@@ -306,7 +305,7 @@ class _RunSetting:
         return outcomes
 
     def _record(self, cell: Cell, outcome: Outcome, folder: Path) -> Record:
-        scores = self.scorer.collect(cell.motions_key) if outcome.status == "ok" else None
+        scores = self.scorer.collect(cell.motions_key, given=cell.given) if outcome.status == "ok" else None
         arrays = assemble.sample_arrays(self.setting, scores) if scores else {}
         facts: dict[str, Any] = self.store.facts("motions", cell.motions_key) if scores else {}
         made = provenance(

@@ -41,7 +41,6 @@ class ScoreSpec:
     judges_folder: str
     judges_digest: str
     reference_key: str
-    real_digest: str
     protocol_id: str
     window_frames: int
     metrics: tuple[tuple[str, int], ...]
@@ -90,34 +89,33 @@ class Scorer:
         takes = [(pack.take(task.content_take_id), task.start_frame) for task in self.tasks]
         return Motions.of([take.with_clip(window(take.clip, start, self.spec.window_frames)) for take, start in takes])
 
-    def keys(self, motions_digest: str) -> dict[str, str]:
+    def keys(self, motions_digest: str, given: bool) -> dict[str, str]:
         """Metric name -> score key."""
-        spec = self.spec
         return {
-            name: score_key(motions_digest, spec.judges_digest, spec.real_digest, spec.tasks_digest, name, version)
-            for name, version in spec.metrics
+            name: score_key(motions_digest, self.spec.reference_key, given, name, version)
+            for name, version in self.spec.metrics
         }
 
-    def missing(self, motions_digest: str) -> list[str]:
+    def missing(self, motions_digest: str, given: bool) -> list[str]:
         """Metrics that the store lacks for these motions."""
-        return [name for name, key in self.keys(motions_digest).items() if not self.store.has("score", key)]
+        return [name for name, key in self.keys(motions_digest, given).items() if not self.store.has("score", key)]
 
     def score(self, motions_key: str, *, given: bool) -> list[str]:
         """Compute what is missing for a cell; returns the names of the metrics that were computed."""
         digest = str(self.store.facts("motions", motions_key)["motions_digest"])
-        missing = self.missing(digest)
+        missing = self.missing(digest, given)
         if missing:
             row = self._row(motions_key, digest, given)
-            keys = self.keys(digest)
+            keys = self.keys(digest, given)
             for name in missing:
                 scored = SCORES[name](row, self.reference)
                 self.store.put("score", keys[name], partial(_write_scored, scored))
         return missing
 
-    def collect(self, motions_key: str) -> CellScores:
+    def collect(self, motions_key: str, *, given: bool) -> CellScores:
         """All stored metrics of a cell."""
         digest = str(self.store.facts("motions", motions_key)["motions_digest"])
-        scored = {name: self._read(key) for name, key in self.keys(digest).items()}
+        scored = {name: self._read(key) for name, key in self.keys(digest, given).items()}
         embedding = Embedding.load(self.store.folder("embed", embed_key(digest, self.spec.judges_digest)))
         return CellScores(digest, embedding, scored)
 
