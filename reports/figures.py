@@ -19,6 +19,7 @@ from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
 from reports.aggregate import Estimate
+from reports.context import judge_summary
 from reports.formatting import ARROWS, number
 from reports.labels import place_labels
 from reports.records import BadRecord, write_bytes_atomically
@@ -86,7 +87,7 @@ def recognition_scatter(table: Table) -> Figure:
             frameon=False,
             borderaxespad=0.2,
         )
-        _caption(figure, f"{table.title}\n{_samples(table, content, rows)}. {_judges(table)}.")
+        _caption(figure, table, content, rows)
         figure.draw_without_rendering()
         place_labels(axes, points, [_annotate(axes, row, point) for row, point in zip(rows, points, strict=True)])
     return figure
@@ -120,7 +121,7 @@ def interval_bars(table: Table, metric: str | None = None) -> Figure:
         unit = "" if column.unit in ("1", "distance") else f" ({column.unit})"
         axes.set(xlabel=f"{column.title}{unit} {ARROWS[column.better]}", title=_headline(column))
         axes.legend(handles=[*_legend(rows), *floor], loc="best", frameon=True, framealpha=0.9, edgecolor="none")
-        _caption(figure, f"{table.title}\n{_samples(table, column, rows)}. {_judges(table)}.")
+        _caption(figure, table, column, rows)
     return figure
 
 
@@ -259,25 +260,10 @@ def _legend(rows: Sequence[TableRow]) -> list[Line2D]:
     ]
 
 
-def _samples(table: Table, column: Column, rows: Sequence[TableRow]) -> str:
+def _caption(figure: Figure, table: Table, column: Column, rows: Sequence[TableRow]) -> None:
     counts = sorted({row.estimates[column.key].n for row in rows})
     n = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     where = "" if column.slice == "all" else f" ({column.slice.replace('_', ' ')})"
-    return f"n = {n} samples{where}"
-
-
-def _judges(table: Table) -> str:
-    families: dict[str, list[float]] = {}
-    for judge in table.judges:
-        if judge.real_accuracy is not None:
-            families.setdefault(judge.id.split("/")[0], []).append(judge.real_accuracy)
-    said = [
-        f"{family} ({len(values)} seed{'s' if len(values) != 1 else ''}, {np.mean(values):.1f} % right on real motion)"
-        for family, values in families.items()
-    ]
-    return "Judges: " + (", ".join(said) if said else "none")
-
-
-def _caption(figure: Figure, text: str) -> None:
-    wrapped = "\n".join(fill(line, CAPTION_COLUMNS) for line in text.splitlines())
+    said = ". ".join(words for words in (f"n = {n} samples{where}", judge_summary(table.judges)) if words)
+    wrapped = "\n".join(fill(line, CAPTION_COLUMNS) for line in (table.title, f"{said}."))
     figure.supxlabel(wrapped, fontsize=7.5, color="#444444", x=0.01, ha="left")

@@ -28,7 +28,8 @@ from reports.records import (
 )
 
 SLICES = ("different_content", "same_content", "all")
-N_JUDGES = 2
+N_JUDGES = 3
+LEFT_OUT = "left out for fewer than 20 real windows: proud"
 
 
 @dataclass(frozen=True)
@@ -149,9 +150,10 @@ def joint_recognition_arrays(
 ) -> dict[str, NDArray[Any]]:
     """The samples arrays of a row of which only joint recognition (percent expected: ``share``) matters."""
     per_judge = [clustered_hits(tasks.cluster, share / 100.0, rng, difficulty=difficulty)]
-    # Judges agree on 97 % of the samples; where they do not, the second guesses with the method's share.
-    guess = rng.random(tasks.n) < share / 100.0
-    per_judge.append(np.where(rng.random(tasks.n) < 0.97, per_judge[0], guess))
+    # Judges agree on 97 % of the samples; where they do not, the others guess with the method's share.
+    for _ in range(1, N_JUDGES):
+        guess = rng.random(tasks.n) < share / 100.0
+        per_judge.append(np.where(rng.random(tasks.n) < 0.97, per_judge[0], guess))
     arrays: dict[str, NDArray[Any]] = {
         "sample_id": np.arange(tasks.n, dtype=np.int32),
         "cluster": tasks.cluster,
@@ -193,28 +195,34 @@ def _plain(
     slice_name: str = "different_content",
     floor: float | None = None,
     reason: str | None = None,
+    details: dict[str, float] | None = None,
 ) -> Measurement:
     spread = 0.0 if value is None else 0.04 * abs(value) + 0.001
     return Measurement(
         name=name, version=1, slice=slice_name, value=value, unit=unit, better=better,
         n=int(tasks.inside(slice_name).sum()), low=None if value is None else value - spread,
-        high=None if value is None else value + spread, floor=floor, reason=reason,
+        high=None if value is None else value + spread, floor=floor, reason=reason, details=details or {},
     )  # fmt: skip
 
 
 def _further_measurements(fake: FakeMethod, joint: float, tasks: FakeTasks) -> tuple[Measurement, ...]:
     kid = fake.conditional_kid
     still = fake.jerk_ratio == 0.0
+    own_labels = fake.name.startswith(("real-", "label-oracle"))
+    residue = None if own_labels else 0.8 * (100.0 - fake.style_right)
+    by_content = {"chance": 100.0 / 7.0, "majority_rate": 24.0}
+    by_style = {"chance": 100.0 / 7.0, "majority_rate": 19.5}
     return (
-        _plain("joint_recognition_ratio", joint / 95.0, "1", "higher", tasks),
-        _plain("conditional_kid", kid, "distance", "lower", tasks, floor=0.011),
+        _plain("joint_recognition_ratio", joint / 95.0, "1", "higher", tasks, details={"real_disjoint_percent": 95.0}),
+        _plain("conditional_kid", kid, "distance", "lower", tasks, floor=0.011, reason=LEFT_OUT),
         _plain("conditional_fmd", 12.0 * kid, "distance", "lower", tasks, floor=0.14),
         _plain("copied_share", fake.copied_share, "%", "lower", tasks, slice_name="all"),
-        _plain("cra", fake.content_right, "%", "higher", tasks),
+        _plain("cra", fake.content_right, "%", "higher", tasks, details=by_content),
         _plain("cra_balanced", 0.97 * fake.content_right, "%", "higher", tasks),
-        _plain("sra", fake.style_right, "%", "higher", tasks),
+        _plain("sra", fake.style_right, "%", "higher", tasks, details=by_style),
         _plain("sra_balanced", 0.98 * fake.style_right, "%", "higher", tasks),
-        _plain("source_style_residue", 0.8 * (100.0 - fake.style_right), "%", "lower", tasks),
+        _plain("source_style_residue", residue, "%", "lower", tasks,
+               reason="scored under its source's own style: nothing was to be removed" if own_labels else None),
         _plain("fmd[stgcn-content]", 1.0 + 3.0 * kid, "distance", "lower", tasks, slice_name="all", floor=0.11),
         _plain("fmd[stgcn-style]", 1.5 + 2.0 * kid, "distance", "lower", tasks, slice_name="all", floor=0.08),
         _plain("fmd[dae]", 0.002 + 0.01 * kid, "distance", "lower", tasks, slice_name="all", floor=0.0003),
@@ -242,7 +250,10 @@ def _classifier(target: str, seed: int, majority_rate: float) -> JudgeFacts:
 JUDGES = (
     *(_classifier("content", seed, 24.0) for seed in range(N_JUDGES)),
     *(_classifier("style", seed, 19.5) for seed in range(N_JUDGES)),
-    JudgeFacts(id="dae/0", digest=digest_of(["judge", "dae", 0]), origin="canonical"),
+    *(
+        JudgeFacts(id=f"autoencoder/{seed}", digest=digest_of(["judge", "autoencoder", seed]), origin="canonical")
+        for seed in range(N_JUDGES)
+    ),
 )
 
 PROVENANCE = Provenance(

@@ -58,7 +58,7 @@ def test_nothing_is_cut_off(name: str, request: pytest.FixtureRequest) -> None:
     drawn = [text for text in figure.findobj(Text) if isinstance(text, Text) and text.get_visible()]
     # Axes keep numbered ticks beyond their limits, which are not drawn.
     words = [text for text in drawn if any(letter.isalpha() for letter in text.get_text())]
-    assert any("Judges: stgcn-content" in text.get_text() for text in words)
+    assert any("Judges (canonical): stgcn-content" in text.get_text() for text in words)
     whole = figure.bbox
     for text, box in zip(words, extents(words), strict=True):
         inside = whole.x0 <= box.x0 + 1 and box.x1 <= whole.x1 + 1 and whole.y0 <= box.y0 + 1 and box.y1 <= whole.y1 + 1
