@@ -10,7 +10,7 @@ from tabulate import tabulate
 
 from reports.formatting import UNDEFINED, count, duration, escape_markdown, number, one_line
 from reports.records import Record
-from reports.render import environment, to_markdown
+from reports.render import anchor_table, environment, to_markdown
 from reports.rows import StoredRecord, groups, load_run
 from reports.tables import Column, Table, TableRow, build_table
 from reports.verdicts import sentences
@@ -29,9 +29,14 @@ def render_leaderboard(records_folder: Path) -> str:
     """
     stored = load_run(records_folder)
     canonical = [item for item in stored if not _is_local(item.record)]
-    sections = [_section(build_table(key, items), items) for key, items in groups(canonical).items()]
+    tables = [(build_table(key, items), items) for key, items in groups(canonical).items()]
     template = environment().get_template("leaderboard.md")
-    return template.render(sections=sections, left_out=_left_out(stored)).rstrip() + "\n"
+    page = template.render(
+        sections=[_section(table, items) for table, items in tables],
+        anchors=anchor_table([table for table, _ in tables]),
+        left_out=_left_out(stored),
+    )
+    return page.rstrip() + "\n"
 
 
 def check(path: Path, records_folder: Path) -> str:
@@ -68,7 +73,6 @@ def _section(table: Table, stored: Sequence[StoredRecord]) -> dict[str, object]:
         "main": to_markdown(table, "main").rstrip(),
         "details": to_markdown(table, "details").rstrip() if table.columns_of("details") else "",
         "judges": _judge_cards(table),
-        "anchors": _anchor_meanings(table),
         "runs": _runs(stored),
     }
 
@@ -132,19 +136,6 @@ def _judge_cards(table: Table) -> str:
         for judge in table.judges
     ]
     return _pipe(["judge", "accuracy on real, %", "chance, %", "commonest class, %", "origin", "digest"], lines)
-
-
-def _anchor_meanings(table: Table) -> str:
-    lines = [
-        [escape_markdown(row.title), escape_markdown(row.row.method.description), escape_markdown(_source(row))]
-        for row in table.rows
-        if row.row.method.kind == "anchor"
-    ]
-    return _pipe(["row", "what it is", "draws from"], lines)
-
-
-def _source(row: TableRow) -> str:
-    return row.row.method.draws_from or UNDEFINED
 
 
 def _runs(stored: Sequence[StoredRecord]) -> list[str]:

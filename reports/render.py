@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import Literal
 
 import jinja2
@@ -11,6 +12,7 @@ import pandas as pd
 from tabulate import tabulate
 
 from reports.aggregate import Estimate
+from reports.context import anchor_meanings, context
 from reports.formatting import (
     UNDEFINED,
     escape_latex,
@@ -24,7 +26,8 @@ from reports.tables import SECTION_TITLES, Column, Part, Section, Table, TableRo
 
 Format = Literal["text", "md", "csv", "latex", "html"]
 TEMPLATES = Path(__file__).with_name("templates")
-FLOOR_TITLE = "floor: real against real, same n"
+FLOOR_TITLE = "floor: real against real"
+TEXT_HEADER_COLUMNS = 12
 
 
 def render(table: Table, form: Format, part: Part = "main") -> str:
@@ -43,19 +46,36 @@ def text_frame(table: Table, part: Part = "main") -> tuple[pd.DataFrame, tuple[s
     """Cells as plain text, one line per row of the table in its order, and the footnotes they point to.
 
     Columns: rank, row, the columns of ``part`` by their headers, n of the primary column, notes. An undefined cell is
-    ``–[a]`` and footnote a says why; ``84.7[b]`` carries a warning. Nothing is escaped.
+    ``–[a]`` and footnote a says why; ``84.7[b]`` carries a warning; a warning all cells of a column share stands at
+    its header. Nothing is escaped.
     """
     reasons: list[str] = []
+    shared = {column.key: _shared_reason(table, column) for column in table.columns_of(part)}
+    headers = [column.header + _mark(shared[column.key], reasons) for column in table.columns_of(part)]
     lines = [
-        [_rank_text(row), row.title, *_cells(table, part, row, reasons), _n_text(table, row), _notes(row)]
+        [_rank_text(row), row.title, *_cells(table, part, row, shared, reasons), _n_text(table, row), _notes(row)]
         for row in table.rows
     ]
     notes = tuple(f"[{footnote_mark(place)}] {reason}" for place, reason in enumerate(reasons))
-    return pd.DataFrame(lines, columns=pd.Index(_headers(table, part)), dtype=str), notes
+    return pd.DataFrame(lines, columns=pd.Index(["rank", "row", *headers, "n", "notes"]), dtype=str), notes
 
 
-def _headers(table: Table, part: Part) -> list[str]:
-    return ["rank", "row", *(column.header for column in table.columns_of(part)), "n", "notes"]
+def _shared_reason(table: Table, column: Column) -> str | None:
+    """The warning that every value of a column carries, None if they do not all carry the same one."""
+    found = [row.estimates.get(column.key) for row in table.rows if row.section != "unfinished"]
+    reasons = {one_line(item.reason) if item is not None and item.reason else "" for item in found}
+    if len(found) < 2 or len(reasons) != 1 or any(item is None or item.value is None for item in found):
+        return None
+    return reasons.pop() or None
+
+
+def _mark(reason: str | None, reasons: list[str]) -> str:
+    """The footnote mark of a reason, which is added to ``reasons`` if it is new; empty without a reason."""
+    if not reason:
+        return ""
+    if reason not in reasons:
+        reasons.append(reason)
+    return f"[{footnote_mark(reasons.index(reason))}]"
 
 
 def _n_text(table: Table, row: TableRow) -> str:
@@ -67,24 +87,23 @@ def _rank_text(row: TableRow) -> str:
     return "" if row.rank is None else str(row.rank)
 
 
-def _cells(table: Table, part: Part, row: TableRow, reasons: list[str]) -> list[str]:
+def _cells(table: Table, part: Part, row: TableRow, shared: Mapping[str, str | None], reasons: list[str]) -> list[str]:
     if row.section == "unfinished":
         return [UNDEFINED for _ in table.columns_of(part)]
-    return [cell_text(column, row.estimates.get(column.key), reasons) for column in table.columns_of(part)]
+    return [
+        cell_text(column, row.estimates.get(column.key), reasons, at_header=shared[column.key])
+        for column in table.columns_of(part)
+    ]
 
 
-def cell_text(column: Column, found: Estimate | None, reasons: list[str]) -> str:
-    """One cell; its reason or warning, if any, goes to ``reasons`` (once) and its mark to the cell."""
-    reason = "not measured in this record" if found is None else found.reason
+def cell_text(column: Column, found: Estimate | None, reasons: list[str], at_header: str | None = None) -> str:
+    """One cell; its reason or warning, if any and not ``at_header``, goes to ``reasons`` and its mark to the cell."""
+    reason = "not measured in this record" if found is None else one_line(found.reason or "")
     text = UNDEFINED
     if found is not None and found.value is not None:
         bounds = (found.low, found.high) if column.interval else (None, None)
         text = with_interval(found.value, *bounds, column.unit)
-    if not reason:
-        return text
-    if one_line(reason) not in reasons:
-        reasons.append(one_line(reason))
-    return f"{text}[{footnote_mark(reasons.index(one_line(reason)))}]"
+    return text if reason == at_header else text + _mark(reason, reasons)
 
 
 def _notes(row: TableRow) -> str:
@@ -160,8 +179,8 @@ def _without_empty_rank(section: Section, frame: pd.DataFrame) -> pd.DataFrame:
     return frame if section == "methods" else frame.drop(columns="rank")
 
 
-def _alignments(frame: pd.DataFrame) -> list[str]:
-    return ["left" if name in ("row", "notes") else "right" for name in frame.columns]
+def _alignments(names: Sequence[str]) -> list[str]:
+    return ["left" if name in ("row", "notes") else "right" for name in names]
 
 
 def _tabulated(frame: pd.DataFrame, style: str, escape: Callable[[str], str]) -> str:
@@ -172,27 +191,69 @@ def _tabulated(frame: pd.DataFrame, style: str, escape: Callable[[str], str]) ->
         for line in frame.itertuples(index=False)
     ]
     headers = [str(name) for name in frame.columns]
-    return tabulate(lines, headers=headers, tablefmt=style, disable_numparse=True, colalign=_alignments(frame))
+    return tabulate(lines, headers=headers, tablefmt=style, disable_numparse=True, colalign=_alignments(headers))
 
 
 def to_markdown(table: Table, part: Part = "main") -> str:
-    """Pipe tables, one per section, with their titles in bold and the footnotes below."""
+    """Pipe tables, one per section, with their titles in bold and the footnotes and the context of the numbers below."""
     found, notes = sections(table, part)
     blocks = [
         f"**{SECTION_TITLES[section]}**\n\n{_tabulated(frame, 'pipe', escape_markdown)}" for section, frame in found
     ]
-    if notes:
-        blocks.append("<br>\n".join(escape_markdown(note) for note in notes))
+    below = [*notes, *(context(table) if part == "main" else ())]
+    if below:
+        blocks.append("<br>\n".join(escape_markdown(note) for note in below))
     return "\n\n".join(blocks) + "\n"
 
 
 def to_text(table: Table, part: Part = "main") -> str:
-    """Plain text for a terminal or a log."""
+    """Plain text for a terminal or a log: one grid, headers on several lines, what to know below."""
     found, notes = sections(table, part)
+    grids = [(section, frame) for section, frame in found if section != "unfinished"]
+    failed = [frame for section, frame in found if section == "unfinished"]
+    below = [*notes, *(context(table) if part == "main" else ())]
     blocks = [table.title]
-    blocks += [f"{SECTION_TITLES[section]}\n{_tabulated(frame, 'simple', one_line)}" for section, frame in found]
-    blocks += ["\n".join(notes)] if notes else []
+    blocks += [_text_grid(grids)] if grids else []
+    blocks += [_text_list(SECTION_TITLES["unfinished"], frame.to_numpy().tolist()) for frame in failed]
+    blocks += ["\n".join(below)] if below else []
+    meanings = [(title, _with_source(words, source)) for title, words, source in anchor_meanings([table])]
+    blocks += [_text_list("What the anchor rows are", meanings)] if meanings and part == "main" else []
     return "\n\n".join(blocks) + "\n"
+
+
+def _text_grid(grids: Sequence[tuple[Section, pd.DataFrame]]) -> str:
+    """All sections in one grid, so that their columns stand below each other."""
+    names = list(dict.fromkeys(["rank", *grids[0][1].columns]))
+    lines = [
+        [one_line(str(cell)) for cell in line]
+        for _, frame in grids
+        for line in frame.reindex(columns=names, fill_value="").itertuples(index=False)
+    ]
+    headers = ["\n".join(wrap(name, TEXT_HEADER_COLUMNS)) for name in names]
+    alignments = _alignments(names)
+    grid = tabulate(lines, headers, "simple", disable_numparse=True, colalign=alignments, headersglobalalign="left")
+    drawn = [line.rstrip() for line in grid.splitlines()]
+    head, body = drawn[: -len(lines)], drawn[-len(lines) :]
+    for section, frame in grids:
+        head += [*([""] if section != grids[0][0] else []), SECTION_TITLES[section], *body[: len(frame)]]
+        body = body[len(frame) :]
+    return "\n".join(head)
+
+
+def _text_list(title: str, items: Sequence[Sequence[str]]) -> str:
+    width = max(len(one_line(name)) for name, _ in items)
+    return "\n".join([title, *(f"  {one_line(name):{width}}  {one_line(words)}".rstrip() for name, words in items)])
+
+
+def _with_source(words: str, source: str) -> str:
+    return f"{words} (from {source})" if source else words
+
+
+def anchor_table(tables: Sequence[Table]) -> str:
+    """What every anchor row of the tables is, each once, as a Markdown table; empty without anchors."""
+    lines = [[escape_markdown(cell) or UNDEFINED for cell in line] for line in anchor_meanings(tables)]
+    headers = ["row", "what it is", "draws from"]
+    return tabulate(lines, headers=headers, tablefmt="pipe", disable_numparse=True) if lines else ""
 
 
 def to_csv(table: Table) -> str:
@@ -206,7 +267,7 @@ def to_latex(table: Table, part: Part = "main") -> str:
     Needs ``\\usepackage{booktabs}``.
     """
     found, notes = sections(table, part)
-    headers = _headers(table, part)
+    headers = list(text_frame(table, part)[0].columns)
     form = "".join("l" if name in ("row", "notes") else "r" for name in headers)
     lines = [f"\\begin{{tabular}}{{{form}}}", r"\toprule", _latex_line(headers)]
     for section, frame in found:
@@ -232,7 +293,7 @@ def _latex_line(cells: Sequence[str]) -> str:
 def to_html(table: Table, part: Part = "main") -> str:
     """A ``<table>`` element with sections as row groups and the footnotes below; style is left to the page."""
     found, notes = sections(table, part)
-    headers = _headers(table, part)
+    headers = list(text_frame(table, part)[0].columns)
     groups = [
         (SECTION_TITLES[section], frame.reindex(columns=headers, fill_value="").to_numpy().tolist())
         for section, frame in found

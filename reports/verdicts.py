@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from reports.aggregate import paired_difference
+from reports.aggregate import badness, paired_difference
 from reports.formatting import escape_markdown, number
 from reports.significance import SIGNIFICANCE, holm
 from reports.tables import Column, Table, TableRow
@@ -100,7 +100,7 @@ def sentences(table: Table) -> list[str]:
         said.append(f"**Not separable from doing nothing:** {_names(verdict.does_nothing)}.")
     if verdict.copying_methods:
         said.append(f"**Only copy** (no rank, whatever they score): {_names(verdict.copying_methods)}.")
-    said.append(_scale(table, column))
+    said += [_scale(table, column), _if_frechet_ranked(table)]
     return [sentence for sentence in said if sentence]
 
 
@@ -130,6 +130,24 @@ def _scale(table: Table, column: Column) -> str:
     if trick is not None:
         parts.insert(1, f"the best simple trick ({escape_markdown(trick.title)}) {_value(column, trick)}")
     return f"**Scale** of {column.title}: {', '.join(parts)}." if parts else ""
+
+
+def _if_frechet_ranked(table: Table) -> str:
+    """Rows without merit that plain FMD would put above real motion: why it does not rank."""
+    column = next((column for column in table.columns if column.metric == "fmd[stgcn-content]"), None)
+    anchors = [row for row in table.of("anchors") if row.row.method.kind == "anchor"]
+    real = next((row for row in anchors if row.row.method.name == "real-disjoint"), None)
+    if column is None or real is None:
+        return ""
+    limit = badness(real.row, column.metric, column.slice)
+    idle = [row for row in anchors if not is_one_of(row.row.method.name, CEILING_ROWS)]
+    better = [row for row in idle if badness(row.row, column.metric, column.slice) < limit]
+    if not better:
+        return ""
+    named = ", ".join(f"{escape_markdown(row.title)} {_value(column, row)}" for row in better)
+    return (
+        f"**If {column.title} ranked**, these would beat {escape_markdown(real.title)} {_value(column, real)}: {named}."
+    )
 
 
 def _names(rows: Sequence[TableRow]) -> str:

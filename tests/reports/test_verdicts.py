@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -99,3 +100,25 @@ def test_a_json_file_that_is_no_record_is_named(tmp_path: Path) -> None:
     (tmp_path / "notes.json").write_text("{}")
     with pytest.raises(BadRecord, match=r"notes\.json: not a record"):
         load_run(tmp_path)
+
+
+def test_plain_fmd_is_shown_to_prefer_rows_without_merit(tmp_path: Path) -> None:
+    flattered = replace(ANCHORS[3], conditional_kid=0.001)
+    assert flattered.name == "copy-content"
+    [found] = tables_of_run(write_run(tmp_path, (ANCHORS[1], flattered), FakeTasks(n=60, n_clusters=12)))
+    assert "these would beat real disjoint 1.03: copy content 1.00" in sentences(found)[-1]
+
+
+def test_a_warning_of_a_whole_column_stands_at_its_header_once(tmp_path: Path) -> None:
+    for fake in ANCHORS[:3]:
+        record, arrays = make_row(fake, FakeTasks(n=60, n_clusters=12))
+        warned = tuple(
+            m.model_copy(update={"reason": "few windows"} if m.name == "cra" else {}) for m in record.measurements
+        )
+        write_row(tmp_path, record.model_copy(update={"measurements": warned}), arrays)
+    [found] = tables_of_run(tmp_path)
+    frame, notes = text_frame(found)
+    [note] = [note for note in notes if note.endswith("few windows")]
+    [header] = [name for name in frame.columns if name.startswith("CRA")]
+    assert header == f"CRA, % ↑{note.split()[0]}"
+    assert not frame[header].str.contains("[", regex=False).any()
