@@ -86,7 +86,7 @@ def estimate(row: Row, metric: str, slice_name: str) -> Estimate | None:
     known = [measurement for measurement in found if measurement.value is not None]
     values = [measurement.value for measurement in known if measurement.value is not None]
     value, seed_sd = mean_and_sd(values) if values else (None, None)
-    low, high = _interval(row, known, metric, slice_name, value)
+    low, high = _inside_unit(*_interval(row, known, metric, slice_name, value), found[0])
     floors = [measurement.floor for measurement in found if measurement.floor is not None]
     reasons = [measurement.reason for measurement in found if measurement.reason]
     return Estimate(
@@ -116,6 +116,14 @@ def _interval(
         return None, None
     low, high = interval(value, replicates)
     return (low, high) if np.isfinite(low) else (None, None)
+
+
+def _inside_unit(low: float | None, high: float | None, kind: Measurement) -> tuple[float | None, float | None]:
+    """Shifting an interval onto its value can push it out of what a percentage can be."""
+    if kind.unit != "%" or low is None or high is None:
+        return low, high
+    # Only shares of samples end at 100; bone drift does not.
+    return max(low, 0.0), min(high, 100.0) if kind.better == "higher" else high
 
 
 def _judge_sd(known: Sequence[Measurement]) -> float | None:

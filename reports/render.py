@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -14,6 +15,7 @@ from tabulate import tabulate
 from reports.aggregate import Estimate
 from reports.context import anchor_meanings, context
 from reports.formatting import (
+    ARROWS,
     UNDEFINED,
     escape_latex,
     escape_markdown,
@@ -195,7 +197,7 @@ def _tabulated(frame: pd.DataFrame, style: str, escape: Callable[[str], str]) ->
 
 
 def to_markdown(table: Table, part: Part = "main") -> str:
-    """Pipe tables, one per section, with their titles in bold and the footnotes and the context of the numbers below."""
+    """Pipe tables, one per section, with their titles in bold; footnotes and context below."""
     found, notes = sections(table, part)
     blocks = [
         f"**{SECTION_TITLES[section]}**\n\n{_tabulated(frame, 'pipe', escape_markdown)}" for section, frame in found
@@ -229,7 +231,7 @@ def _text_grid(grids: Sequence[tuple[Section, pd.DataFrame]]) -> str:
         for _, frame in grids
         for line in frame.reindex(columns=names, fill_value="").itertuples(index=False)
     ]
-    headers = ["\n".join(wrap(name, TEXT_HEADER_COLUMNS)) for name in names]
+    headers = [_text_header(name) for name in names]
     alignments = _alignments(names)
     grid = tabulate(lines, headers, "simple", disable_numparse=True, colalign=alignments, headersglobalalign="left")
     drawn = [line.rstrip() for line in grid.splitlines()]
@@ -238,6 +240,12 @@ def _text_grid(grids: Sequence[tuple[Section, pd.DataFrame]]) -> str:
         head += [*([""] if section != grids[0][0] else []), SECTION_TITLES[section], *body[: len(frame)]]
         body = body[len(frame) :]
     return "\n".join(head)
+
+
+def _text_header(name: str) -> str:
+    # Unit and direction stay together: wrap() does not break at a no-break space.
+    bound = re.sub(f" (?=[{''.join(ARROWS.values())}])", "\N{NO-BREAK SPACE}", name)
+    return "\n".join(wrap(bound, TEXT_HEADER_COLUMNS)).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _text_list(title: str, items: Sequence[Sequence[str]]) -> str:
