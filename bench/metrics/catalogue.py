@@ -19,7 +19,7 @@ class Metric:
     unit : ``%``, ``1`` for ratios and correlations, ``distance`` for Frechet and kernel distances, else an SI unit.
     better : the good direction; ``one`` is best at 1, ``none`` has no direction.
     summary : one line.
-    source : paper and place, or DESIGN for our own.
+    source : paper and place, or this benchmark.
     misleads : when the number says something else than it seems to.
     docs : page under docs/metrics that gives the formula.
     """

@@ -57,7 +57,7 @@ def facing_yaw(positions_m: FloatArray) -> FloatArray:
     """Facing direction of canonical poses as yaw about +Y, ``[..., 21, 3] -> [...]`` radians; 0 faces +Z.
 
     Across = (left - right upper leg) + (left - right arm), forward = across x up (Holden 2016, with the right indices
-    for 21 joints; protocols.md A.5). Where across is vertical the direction is undefined and 0 is returned.
+    for 21 joints). Where across is vertical the direction is undefined and 0 is returned.
     """
     across = (
         positions_m[..., LEFT_UP_LEG, :]
@@ -100,8 +100,7 @@ def foot_contacts(
     """Which feet stand, ``[T, 4]`` for left foot, left toe, right foot, right toe.
 
     A joint is in contact where it is slower than ``max_speed_m_s`` and lower than ``max_height_m`` over its own lowest
-    point in the clip. Speed is taken on world positions: in a root-relative frame a planted foot moves at walking speed
-    (protocols.md A.7).
+    point in the clip. Speed is taken on world positions: in a root-relative frame a planted foot moves at walking speed.
     """
     feet = positions_m[:, FOOT_JOINTS, :]
     speed = np.linalg.norm(velocities(feet, fps), axis=-1)

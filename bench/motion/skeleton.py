@@ -1,6 +1,6 @@
 """Skeletons: joint names, tree, rest offsets. The canonical 21 joints on which everything is scored.
 
-The canonical skeleton is the 21-joint CMU cut of Park 2021, Motion Puzzle and Style-ERD (protocols.md A.2): joint names
+The canonical skeleton is the 21-joint CMU cut of Park 2021, Motion Puzzle and Style-ERD: joint names
 and order are fixed, each clip keeps its own bone lengths. Its rest pose (all rotations identity) is a T-pose: Y up,
 facing +Z, left arm along +X, legs straight down.
 """
