@@ -100,7 +100,8 @@ def foot_contacts(
     """Which feet stand, ``[T, 4]`` for left foot, left toe, right foot, right toe.
 
     A joint is in contact where it is slower than ``max_speed_m_s`` and lower than ``max_height_m`` over its own lowest
-    point in the clip. Speed is taken on world positions: in a root-relative frame a planted foot moves at walking speed.
+    point in the clip. Speed is taken on world positions, because in a root-relative frame a planted foot moves at
+    walking speed.
     """
     feet = positions_m[:, FOOT_JOINTS, :]
     speed = np.linalg.norm(velocities(feet, fps), axis=-1)
