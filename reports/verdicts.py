@@ -120,7 +120,7 @@ def _leading(table: Table, column: Column, verdict: Verdict) -> str:
 def _scale(table: Table, column: Column) -> str:
     """Where real motion, the best trick and the best do-nothing row stand on the primary column."""
     anchors = table.of("anchors")
-    families = (("real motion", CEILING_ROWS[:2]), ("the best do-nothing row", NOTHING_ROWS))
+    families = (("real data", CEILING_ROWS[:2]), ("the best do-nothing row", NOTHING_ROWS))
     parts = []
     for words, names in families:
         found = [row for row in anchors if is_one_of(row.row.method.name, names)]

@@ -46,7 +46,7 @@ def test_sentences_name_leaders_copiers_and_the_scale(table: Table) -> None:
     assert "**Leads** on joint recognition (a tie" in said
     assert "**Only copy** (no rank, whatever they score): Cheater." in said
     assert "**Not separable from doing nothing:** Idle." in said
-    assert "real motion" in said and "the best simple trick (style mean-shift)" in said
+    assert "real data (" in said and "the best simple trick (style mean-shift)" in said
 
 
 def test_a_table_of_anchors_only_says_so(tmp_path: Path) -> None:
