@@ -201,8 +201,8 @@ class _RunSetting:
         self.judges = self._judges()
         self.spec = self._spec()
         self.scorer = Scorer(self.spec)
-        self.generated = 0
-        self.scored = 0
+        self.generated: list[str] = []
+        self.scored: list[str] = []
 
     def run(self, records_folder: Path) -> RunResult:
         cells = _cells(self.request, self.setting)
@@ -221,7 +221,7 @@ class _RunSetting:
             futures = [threads.submit(self._run_cell, cell, pool) for cell in cells]
             outcomes = self._gather(futures)
         records = [self._record(cell, outcome, records_folder) for cell, outcome in zip(cells, outcomes, strict=True)]
-        return RunResult(tuple(records), self.generated, self.scored)
+        return RunResult(tuple(records), len(self.generated), len(self.scored))
 
     def _judges(self) -> JudgesOnDisk:
         return judges_for(
@@ -268,10 +268,10 @@ class _RunSetting:
             outcome = self._generate(cell)
             if outcome.status != "ok":
                 return outcome
-            self.generated += 1
+            self.generated.append(cell.motions_key)
         digest = str(self.store.facts("motions", cell.motions_key)["motions_digest"])
         if self.scorer.missing(digest, cell.given):
-            self.scored += len(pool.submit(score_in_process, self.spec, cell.motions_key, cell.given).result())
+            self.scored.extend(pool.submit(score_in_process, self.spec, cell.motions_key, cell.given).result())
         return Outcome("ok")
 
     def _generate(self, cell: Cell) -> Outcome:
