@@ -7,12 +7,15 @@ import shlex
 import shutil
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bench import __version__, console
 from bench.errors import BadConfig, BenchError
+
+if TYPE_CHECKING:
+    from bench.suite.run import RunRequest
 
 RUNS = Path("runs")
 STORE = RUNS / "store"
@@ -216,11 +219,9 @@ def _data_options(options: list[str]) -> dict[str, Path | None]:
     return found
 
 
-def _print_plan(request: object, as_json: bool) -> None:
+def _print_plan(request: RunRequest, as_json: bool) -> None:
     from bench.suite import run as suite
 
-    if not isinstance(request, suite.RunRequest):
-        raise BadConfig("not a run request")
     with console.ProgressDisplay() as progress:
         plans = suite.dry_run(request, progress)
     rows = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from bench.datasets.take import Take
@@ -75,4 +75,3 @@ class DatasetEntry:
     citation: str
     how_to_get: str = ""
     needs_path: bool = True
-    aliases: tuple[str, ...] = field(default=())

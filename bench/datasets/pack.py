@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -84,10 +83,6 @@ class Pack:
             for s in labels["skeletons"]
         )
         return cls(rotations, root, {row["take_id"]: row for row in labels["takes"]}, skeletons)
-
-    @cached_property
-    def take_ids(self) -> tuple[str, ...]:
-        return tuple(self.rows)
 
     def take(self, take_id: str) -> Take:
         """One take with all its labels."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from bench.datasets.take import Take
 from bench.errors import BadFile
 from bench.motion.clip import Clip
 from bench.motion.kinematics import forward_kinematics
-from bench.motion.representation import window_frame
+from bench.motion.representation import JUDGE_SLICES, window_frame
 from bench.motion.skeleton import Skeleton, canonical_skeleton
 from reports.records import digest_of_arrays
 
@@ -133,6 +134,11 @@ class Motions:
             positions, turned = window_frame(rotations, root, self.skeleton(k))
             features[rows] = np.concatenate([positions, turned], axis=-1)
         return features
+
+    @cached_property
+    def window_positions(self) -> FloatArray:
+        """Joint positions in the window frame ``[n, T, 21, 3]``, statures: a slice of :meth:`window_features`."""
+        return self.window_features()[..., JUDGE_SLICES["position_statures"]]
 
     def _by_skeleton(self) -> list[tuple[int, NDArray[np.intp], FloatArray, FloatArray]]:
         groups = []

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.datasets.base import Dataset
-from bench.datasets.pack import Pack, write_pack
+from bench.datasets.pack import write_pack
 from bench.datasets.split import Split, deal
 from bench.datasets.take import Take
 from bench.protocols.base import Protocol, Task, stable_seed
@@ -83,9 +83,3 @@ def prepare(
 def _write_takes(folder: Path, takes: Sequence[Take]) -> dict[str, Any]:
     write_pack(folder, takes)
     return {"n": len(takes)}
-
-
-def open_takes(pack_folder: Path, take_ids: Sequence[str]) -> list[Take]:
-    """Some takes of a pack, in the order given."""
-    pack = Pack.open(pack_folder)
-    return [pack.take(take_id) for take_id in take_ids]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.arrays import FloatArray, IntArray
+from bench.arrays import IntArray
 from bench.datasets.take import Take
 from bench.metrics.frechet import PrincipalComponents
 from bench.motion.edit import window
@@ -105,8 +105,3 @@ def row(reference: Reference, *, content_right: float = 1.0, style_right: float 
         source_styles=sources,
         given=given,
     )
-
-
-def mean_of(values: FloatArray) -> float:
-    """Plain mean, as a float."""
-    return float(np.mean(values))

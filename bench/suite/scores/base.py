@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import BoolArray, FloatArray, IntArray
-from bench.metrics import METRICS, frechet, recognition
+from bench.metrics import METRICS, frechet, physics, recognition
 from bench.protocols.base import Task
 from bench.suite.copying import DescriptorBank
 from bench.suite.embedding import Embedding
@@ -101,6 +101,11 @@ class Row:
     def positions_m(self) -> FloatArray:
         """World positions of the outputs ``[n, T, 21, 3]``."""
         return self.motions.world_positions()
+
+    @cached_property
+    def jerk(self) -> FloatArray:
+        """Mean jerk of each output, ``[n]`` m/s^3."""
+        return physics.jerk_per_sample(self.positions_m, self.motions.fps, joints=self.joints)
 
     @cached_property
     def content_correct(self) -> BoolArray:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.arrays import FloatArray
 from bench.metrics import memorisation, physics
 from bench.motion.skeleton import CANONICAL_PARENTS
-from bench.suite.motions import Motions
 from bench.suite.scores.base import PRIMARY_SLICE, Reference, Row, Scored, measure, share_score
 from reports.bootstrap import mean_replicates
 
 
 def copied_share(row: Row, reference: Reference) -> Scored:
     """Outputs nearer to the fit part, their source or their style reference than the copy threshold."""
-    positions = row.motions.window_features()[..., :3]
-    queries = memorisation.pose_descriptors(positions)
+    queries = memorisation.pose_descriptors(row.motions.window_positions)
     distances = reference.fit_bank.nearest(queries)
     if row.given:
         for takes in ([t.content_take_id for t in reference.tasks], [t.style_take_id for t in reference.tasks]):
@@ -33,7 +30,7 @@ def copied_share(row: Row, reference: Reference) -> Scored:
 
 def jerk_ratio(row: Row, reference: Reference) -> Scored:
     """Mean jerk over that of real motion with the same mixture of contents."""
-    jerk = physics.jerk_per_sample(row.positions_m, row.motions.fps, joints=row.joints)
+    jerk = row.jerk
     per_content = np.array(
         [reference.floor_jerk[reference.floor.contents == c].mean() for c in range(len(reference.content_labels))]
     )
@@ -51,8 +48,7 @@ def jerk_ratio(row: Row, reference: Reference) -> Scored:
 
 def jerk_ratio_worst_content(row: Row, reference: Reference) -> Scored:
     """The per-content jerk ratio that is farthest from 1, as a factor."""
-    jerk = physics.jerk_per_sample(row.positions_m, row.motions.fps, joints=row.joints)
-    ratios = physics.ratio_per_content(reference.floor_jerk, reference.floor.contents, jerk, row.contents)
+    ratios = physics.ratio_per_content(reference.floor_jerk, reference.floor.contents, row.jerk, row.contents)
     with np.errstate(divide="ignore"):
         worst = max(ratios, key=lambda content: abs(np.log(ratios[content])))
     details = {f"content={reference.content_labels[c]}": ratio for c, ratio in ratios.items()}
@@ -61,7 +57,7 @@ def jerk_ratio_worst_content(row: Row, reference: Reference) -> Scored:
 
 def time_correlation(row: Row, reference: Reference) -> Scored:
     """Correlation over time with the source."""
-    values = physics.time_correlation(_window_positions(row.source), _window_positions(row.motions), joints=row.joints)
+    values = physics.time_correlation(row.source.window_positions, row.motions.window_positions, joints=row.joints)
     measurements, replicates = [], {}
     for slice_name in ("all", PRIMARY_SLICE):
         mask = reference.slices[slice_name] & np.isfinite(values)
@@ -75,10 +71,6 @@ def time_correlation(row: Row, reference: Reference) -> Scored:
             measure("time_correlation", slice_name, float(values[mask].mean()), int(mask.sum()), replicates=draws)
         )
     return Scored(tuple(measurements), {"time_correlation": values}, replicates)
-
-
-def _window_positions(motions: Motions) -> FloatArray:
-    return motions.window_features()[..., :3]
 
 
 def bone_drift(row: Row, reference: Reference) -> Scored:
