@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.metrics.catalogue import TRANSFER_METRICS, Metric
+from bench.metrics.catalogue import ALL_METRICS, Metric
 
-METRICS: dict[str, Metric] = {metric.name: metric for metric in TRANSFER_METRICS}
+METRICS: dict[str, Metric] = {metric.name: metric for metric in ALL_METRICS}
 """Name -> what the number is. One function, one row here and one docs section make a metric."""

@@ -40,6 +40,11 @@ PUZZLE = "Motion Puzzle 2022, section 7.2.2"
 ERD = "Style-ERD 2022, section 4.2"
 HEUSEL = "Heusel 2017, eq. 6"
 KERNEL = "Binkowski 2018, section 4"
+LOCALITY = "Motion Puzzle 2022, section 7.1, Table 1"
+HANDS = "Kuriyama 2022, section 4.2, eq. 13-16"
+ERD_TIME = "Style-ERD 2022, section 4.4, Table 2"
+MASON = "Mason 2022, section 4.3, eq. 5"
+MASON_TIME = "Mason 2022, Table 2"
 
 TRANSFER_METRICS: tuple[Metric, ...] = (
     Metric("joint_recognition", 1, "%", "higher", "content and style both judged right on the same sample", OURS,
@@ -82,3 +87,140 @@ TRANSFER_METRICS: tuple[Metric, ...] = (
     Metric("bone_drift", 1, "%", "lower", "departure of bone lengths from the source's", OURS,
            "0 by construction for outputs given as rotations", "physics"),
 )  # fmt: skip
+
+PAPER_METRICS: tuple[Metric, ...] = (
+    Metric("cra_top3", 1, "%", "higher", "the source's content is among the judge's three likeliest", OURS,
+           "near 100 where there are few contents", "recognition"),
+    Metric("sra_top3", 1, "%", "higher", "the wanted style is among the judge's three likeliest", OURS,
+           "near 100 where there are few styles", "recognition"),
+    Metric("fmd[stgcn]", 1, "distance", "lower", "Frechet distance in content-judge features, mean over trials", PARK,
+           "copies of the input beat real motion; comparable with no paper's numbers, whose evaluators are unpublished",
+           "frechet"),
+    Metric("fmd[dae-512]", 1, "distance", "lower",
+           "Frechet distance in all 512 auto-encoder features of the centre 24 frames, mean over trials", ERD,
+           "blind to noise; mostly bias below some thousand samples", "frechet"),
+    Metric("fmd[dae-512-first]", 1, "distance", "lower", "the same on the first 24 frames of each sample", ERD,
+           "sees nothing of what a method does after its first frames", "frechet"),
+    Metric("fmd[dae-512-every]", 1, "distance", "lower", "the same on every 24 frames of each sample", ERD,
+           "more windows than samples: they are not independent", "frechet"),
+)  # fmt: skip
+
+CONDITION_METRICS: tuple[Metric, ...] = (
+    Metric("reconstruction_position", 1, "cm", "lower", "joint distance between output and source, content = style",
+           OURS, "a copy of the source is perfect", "paired"),
+    Metric("reconstruction_rotation", 1, "deg", "lower", "angle between joint rotations of output and source", OURS,
+           "a copy of the source is perfect", "paired"),
+    Metric("join_jerk_ratio", 1, "1", "one", "output over source of jerk at joins divided by jerk elsewhere", OURS,
+           "trembling everywhere hides jumps at joins", "physics"),
+    Metric("prefix_error", 1, "cm", "lower", "joint distance of the answer to a prefix from the full answer", OURS,
+           "a method that ignores its input is perfect", "paired"),
+    Metric("paired_position", 1, "cm", "lower", "joint distance to the true answer, frame by frame", OURS,
+           "punishes right poses at other times", "paired"),
+    Metric("paired_rotation", 1, "deg", "lower", "angle to the true answer's joint rotations, frame by frame", OURS,
+           "punishes right poses at other times", "paired"),
+    Metric("paired_position_aligned", 1, "cm", "lower", "joint distance to the true answer along the DTW path", OURS,
+           "forgives any timing, a wrong rhythm too", "paired"),
+    Metric("paired_rotation_aligned", 1, "deg", "lower", "angle to the true answer along the DTW path", OURS,
+           "forgives any timing, a wrong rhythm too", "paired"),
+)  # fmt: skip
+
+PARTS_METRICS: tuple[Metric, ...] = (
+    Metric("locality_msd", 1, "stature^2", "none", "mean squared displacement of the joints, in statures", LOCALITY,
+           "arms move when the spine turns below them: positions are not independent of the part", "locality"),
+    Metric("locality_distance", 1, "stature", "none", "mean distance of the joints, in statures", LOCALITY,
+           "arms move when the spine turns below them", "locality"),
+    Metric("joints_above_0.1", 1, "joints", "none", "joints whose mean squared displacement is over 0.1", LOCALITY,
+           "a transfer that hardly moves anything has short lists", "locality"),
+    Metric("joints_above_0.05", 1, "joints", "none", "joints whose mean squared displacement is over 0.05", LOCALITY,
+           "a transfer that hardly moves anything has short lists", "locality"),
+    Metric("leak_ratio", 1, "1", "lower", "rotation change of untouched over touched joints", OURS,
+           "0 for a method that changes nothing outside the part, whatever it does inside", "locality"),
+    Metric("leak_ratio[position]", 1, "1", "lower", "displacement of untouched over touched joints", OURS,
+           "not 0 where a perfectly local spine carries the arms along", "locality"),
+)  # fmt: skip
+
+GESTURE_METRICS: tuple[Metric, ...] = (
+    Metric("gesture_error", 1, "m", "lower", "content error + style error, means", OURS,
+           "in the intra condition the style reference is itself a right answer", "gesture"),
+    Metric("content_error", 1, "m", "lower", "hand distance to the content along the DTW path, mean", HANDS,
+           "0 for a copy of the content; another take of the same gestures is far from 0", "gesture"),
+    Metric("content_error_worst", 1, "m", "lower", "the same, largest pair", HANDS,
+           "one bad frame decides", "gesture"),
+    Metric("content_error_worst_quarter", 1, "m", "lower", "the same, mean of the largest quarter", HANDS,
+           "0 for a copy of the content", "gesture"),
+    Metric("content_error[world]", 1, "m", "lower", "content error of hands in the world frame", HANDS,
+           "drift of the root counts as wrong hands", "gesture"),
+    Metric("content_error[fastdtw]", 1, "m", "lower", "content error along FastDTW's path (radius 1)", HANDS,
+           "the path may be dearer than the best one", "gesture"),
+    Metric("style_error", 1, "m", "lower", "distance to the nearest style segment of 2.13 s, mean", HANDS,
+           "0 for a copy of the style; a human imitation scores worse than every published method", "gesture"),
+    Metric("style_error_worst", 1, "m", "lower", "the same, largest segment", HANDS, "one segment decides", "gesture"),
+    Metric("style_error_worst_quarter", 1, "m", "lower", "the same, mean of the largest quarter", HANDS,
+           "0 for a copy of the style", "gesture"),
+    Metric("style_error[1.07s]", 1, "m", "lower", "style error with segments of 1.07 s", HANDS,
+           "short segments find a near one anywhere", "gesture"),
+    Metric("style_error[4.27s]", 1, "m", "lower", "style error with segments of 4.27 s", HANDS,
+           "few segments in a sequence", "gesture"),
+    Metric("style_error[world]", 1, "m", "lower", "style error of hands in the world frame", HANDS,
+           "mostly where people stand", "gesture"),
+)  # fmt: skip
+
+INTERPOLATION_METRICS: tuple[Metric, ...] = (
+    Metric("monotonicity", 1, "1", "higher", "Spearman of weight and the judge's log odds of target against start",
+           OURS, "a change in one step is monotone too; read it beside evenness", "interpolation"),
+    Metric("evenness", 1, "1", "one", "largest step between neighbouring weights over the mean step", OURS,
+           "1 for a blend of poses that shows neither content", "interpolation"),
+    Metric("end_recognition", 1, "%", "higher", "content and style both judged right at weights 0 and 1", OURS,
+           "copies of both ends are perfect", "interpolation"),
+    Metric("middle_content", 1, "%", "higher", "content judged right strictly between the ends", OURS,
+           "a copy of the source is perfect", "interpolation"),
+)  # fmt: skip
+
+PREDICTION_METRICS: tuple[Metric, ...] = (
+    Metric("next_frame_error", 1, "1", "lower", "mean squared error of z-scored features of the next frame", MASON,
+           "repeating the last frame is hard to beat; does not track how motion looks", "prediction"),
+    Metric("bone_length_loss", 1, "cm", "lower", "mean absolute difference of bone lengths", MASON,
+           "0 by construction for methods that predict rotations", "prediction"),
+)  # fmt: skip
+
+RUNTIME_METRICS: tuple[Metric, ...] = (
+    Metric("latency_p50", 1, "ms", "lower", "duration of a call, median", ERD_TIME,
+           "host and threads decide; compare rows of one record set only", "runtime"),
+    Metric("latency_p90", 1, "ms", "lower", "duration of a call, 90 % quantile", OURS,
+           "a busy host shows here first", "runtime"),
+    Metric("latency_p99", 1, "ms", "lower", "duration of a call, 99 % quantile", OURS,
+           "needs some hundred calls", "runtime"),
+    Metric("latency_max", 1, "ms", "lower", "duration of the longest call", OURS, "grows with the number of calls",
+           "runtime"),
+    Metric("frames_per_second", 1, "1/s", "higher", "frames produced per second of computing, median call",
+           "Kuriyama 2022, section 3", "batches hide the latency of one frame", "runtime"),
+    Metric("real_time_factor", 1, "1", "higher", "seconds of motion per second of computing, median call", OURS,
+           "over 1 offline does not mean usable online", "runtime"),
+    Metric("deadline_miss", 1, "%", "lower", "online calls longer than one frame", OURS,
+           "a busy host misses for the method", "runtime"),
+    Metric("load_time", 1, "s", "lower", "from nothing to a loaded adapter", OURS, "includes imports and disk caches",
+           "runtime"),
+    Metric("first_call", 1, "ms", "lower", "duration of the first call", OURS, "compilation counts", "runtime"),
+    Metric("startup_designed", 1, "s", "lower", "input length the method was made for", ERD_TIME,
+           "declared by the method, not measured", "runtime"),
+    Metric("startup_measured", 1, "s", "lower", "input that must have come before the first frame can be final", OURS,
+           "found by changing later input frames of one window", "runtime"),
+    Metric("parameters", 1, "count", "lower", "trainable numbers used in a call", MASON_TIME,
+           "declared by the method", "runtime"),
+    Metric("bytes_per_style", 1, "B", "lower", "what must be kept for each style", MASON_TIME,
+           "declared by the method", "runtime"),
+    Metric("peak_memory", 1, "MB", "lower", "largest resident memory of the process", OURS,
+           "the interpreter and its libraries count", "runtime"),
+)  # fmt: skip
+
+ALL_METRICS = (
+    *TRANSFER_METRICS,
+    *PAPER_METRICS,
+    *CONDITION_METRICS,
+    *PARTS_METRICS,
+    *GESTURE_METRICS,
+    *INTERPOLATION_METRICS,
+    *PREDICTION_METRICS,
+    *RUNTIME_METRICS,
+)
+"""Every row of METRICS, by what first needed it."""
