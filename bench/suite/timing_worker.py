@@ -1,0 +1,216 @@
+"""The process in which one adapter is timed, started as ``python -m bench.suite.timing_worker JOB.json FD_IN FD_OUT``.
+
+It loads the adapter, says so, and then answers one request at a time: while it waits, others compute. What the method
+prints goes to the log that the parent made stdout and stderr; messages travel as JSON lines on their own pipes.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import resource
+import statistics
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_info
+
+from bench.adapters.base import Adapter, Description
+from bench.adapters.loading import find_adapter
+from bench.adapters.oracles import Oracle
+from bench.errors import BadConfig, BadMotion, BadOutput, BenchError
+from bench.suite.look_ahead import LookAhead, measured_look_ahead
+from bench.suite.store import Store
+from bench.suite.timed_calls import Calls, Clock, timed, timed_inputs
+from bench.suite.timing_plan import TimingJob, TimingPlan, read_job
+
+
+class Unsupported(BenchError):
+    """An adapter that the runtime track has no use for."""
+
+
+def main(arguments: list[str]) -> int:
+    """Answer requests until the parent closes the pipe; a failure is the last answer."""
+    job, plan, threads = read_job(Path(arguments[0]))
+    threading.Thread(target=_leave_with_parent, args=(os.getppid(),), daemon=True).start()
+    for number in (int(arguments[1]), int(arguments[2])):
+        os.set_inheritable(number, False)
+    requests = os.fdopen(int(arguments[1]), "r")
+    answers = os.fdopen(int(arguments[2]), "w", buffering=1)
+
+    def send(message: dict[str, Any]) -> None:
+        answers.write(json.dumps(message) + "\n")
+
+    send({"memory_mb": memory_mb("VmRSS")})
+    try:
+        worker = TimingWorker(job, plan, threads, loaded_adapter(job), time.perf_counter_ns)
+        send({"loaded": True})
+        for line in requests:
+            send(worker.answer(json.loads(line)))
+    except Exception as error:
+        traceback.print_exc()
+        send(failure(error))
+    return 0
+
+
+def loaded_adapter(job: TimingJob) -> Adapter:
+    """The adapter, ready to answer.
+
+    Raises
+    ------
+    Unsupported : it cannot be timed at all.
+    """
+    adapter_class = find_adapter(job.source)
+    if issubclass(adapter_class, Oracle):
+        raise Unsupported("it looks its answers up: there is nothing to time")
+    if not {"transfers", "streams"} & set(adapter_class.capabilities()):
+        raise Unsupported("the runtime track needs an adapter that transfers or streams")
+    adapter = adapter_class()
+    if job.fit_key:
+        adapter.load(Store(Path(job.store)).folder("fit", job.fit_key))
+    return adapter
+
+
+class TimingWorker:
+    """Answers the parent's requests for one loaded adapter."""
+
+    def __init__(self, job: TimingJob, plan: TimingPlan, threads: int, adapter: Adapter, clock: Clock) -> None:
+        self.job = job
+        self.plan = plan
+        self.threads = threads
+        self.adapter = adapter
+        self.clock = clock
+        self.calls: Calls | None = None
+
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        """One request, by its ``do``: ``prepare``, ``first``, ``warm_up``, ``block``, ``look_ahead``, ``facts``."""
+        match request["do"]:
+            case "prepare":
+                return self._prepare()
+            case "first":
+                return self._first()
+            case "warm_up":
+                return self._warm_up(str(request["slice"]))
+            case "block":
+                return self._block(str(request["slice"]), int(request["round"]), int(request["calls"]))
+            case "look_ahead":
+                return self._look_ahead()
+            case "facts":
+                return self._facts()
+        raise BadConfig(f"unknown request {request['do']!r}")
+
+    @property
+    def ready(self) -> Calls:
+        if self.calls is None:
+            raise BadConfig("a call was asked for before 'prepare'")
+        return self.calls
+
+    def _prepare(self) -> dict[str, Any]:
+        self._limit_torch()
+        inputs = timed_inputs(self.job, self.plan, self.adapter)
+        self.calls = Calls(self.adapter, inputs, self.plan, self.job.seed, self.clock)
+        return {"slices": self.calls.slices, "transfers": self.calls.transfers, "streams": self.calls.streams}
+
+    def _first(self) -> dict[str, Any]:
+        """The first call of all; for a stream, opening it belongs to that."""
+        slice_name, block = self.ready.first_block()
+        durations, outputs = timed(block.call, block.arguments, self.clock)
+        block.check(outputs)
+        self._limit_torch()
+        return {"slice": slice_name, "ns": durations[0] + (block.opening_ns or 0)}
+
+    def _warm_up(self, slice_name: str) -> dict[str, Any]:
+        """Calls of one slice until they are enough, or take too much of the time there is; the usual one's duration."""
+        durations: list[int] = []
+        calls = 1
+        while len(durations) < self.plan.warm_up_calls and sum(durations) < 1e9 * self.plan.bound_s / 4:
+            block = self.ready.block(slice_name, 0, min(calls, self.plan.warm_up_calls - len(durations)))
+            taken, outputs = timed(block.call, block.arguments, self.clock)
+            block.check(outputs)
+            durations += taken
+            calls *= 2
+        gc.collect()
+        gc.freeze()
+        return {"calls": len(durations), "ns": statistics.median(durations[len(durations) // 2 :])}
+
+    def _block(self, slice_name: str, round_number: int, calls: int) -> dict[str, Any]:
+        """Timed calls; of more than one the first, which finds the caches as another process left them, is not kept."""
+        settling = int(calls > 1)
+        block = self.ready.block(slice_name, round_number, calls + settling)
+        durations, outputs = timed(block.call, block.arguments, self.clock)
+        overhead, _ = timed(block.empty, block.arguments, self.clock)
+        block.check(outputs)
+        return {"ns": durations[settling:], "overhead_ns": overhead[settling:], "opening_ns": block.opening_ns}
+
+    def _look_ahead(self) -> dict[str, Any]:
+        found = LookAhead(0) if self.ready.streams else measured_look_ahead(*self.ready.look_ahead_call())
+        return {"frames": found.frames, "to_the_end": found.to_the_end, "reason": found.reason}
+
+    def _facts(self) -> dict[str, Any]:
+        traits = self.adapter.traits
+        described = self.adapter.describe() if "describes" in self.adapter.capabilities() else None
+        if described is not None and not isinstance(described, Description):
+            raise BadOutput(f"expected a Description, got {type(described).__name__}", where="describe()")
+        declared = described.designed_input_frames if described else None
+        return {
+            "parameters": described.parameters if described else None,
+            "bytes_per_style": described.bytes_per_style if described else None,
+            "designed_input_frames": traits.designed_input_frames if declared is None else declared,
+            "threads": self._thread_counts(),
+            "peak_memory_mb": memory_mb("VmHWM"),
+        }
+
+    def _limit_torch(self) -> None:
+        """Pin torch where the adapter brought it: environment variables alone do not bind all of its pools."""
+        torch = sys.modules.get("torch")
+        if torch is not None:
+            torch.set_num_threads(self.threads)
+
+    def _thread_counts(self) -> dict[str, int]:
+        counts = {"limit": self.threads}
+        for pool in threadpool_info():
+            kind = str(pool["user_api"])
+            counts[kind] = max(counts.get(kind, 0), int(pool["num_threads"]))
+        torch = sys.modules.get("torch")
+        if torch is not None:
+            counts["torch"] = int(torch.get_num_threads())
+        return counts
+
+
+def failure(error: Exception) -> dict[str, Any]:
+    """The last message of a worker: a status and one line."""
+    status = "invalid" if isinstance(error, BadOutput | BadMotion) else "failed"
+    if isinstance(error, Unsupported):
+        status = "unsupported"
+    if isinstance(error, MemoryError):
+        status = "oom"
+    text = str(error) if isinstance(error, BenchError) else f"{type(error).__name__}: {error}"
+    return {"failed": status, "reason": " ".join(text.split())}
+
+
+def memory_mb(field: str) -> float:
+    """``VmRSS`` or ``VmHWM`` (its peak) of this process, MB.
+
+    Not ``ru_maxrss``, which starts at what the parent had when it forked.
+    """
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith(f"{field}:")) / 1024
+    except (OSError, StopIteration):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _leave_with_parent(parent: int) -> None:
+    """End this process soon after the one that started it is gone, also in the middle of a long call."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
