@@ -1,4 +1,4 @@
-"""Finding an adapter: by name in the table, in a user's file, or as an installed entry point."""
+"""Finding an adapter: by name in the table, in a user's file, as an outside program, or as an installed entry point."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from bench.adapters import ADAPTERS
 from bench.adapters.base import Adapter
+from bench.adapters.external import external_adapter
 from bench.errors import BadConfig, MethodFailed
 
 ENTRY_POINT_GROUP = "stylebench.adapters"
@@ -19,7 +20,8 @@ ENTRY_POINT_GROUP = "stylebench.adapters"
 class AdapterSource:
     """Where an adapter comes from, in a form that another process can follow.
 
-    ``name`` alone means the table or an entry point; with ``file`` it is ``class_name``, or the only class, in there.
+    ``name`` alone means the table or an entry point; with ``file`` it is ``class_name``, or the only class, in that
+    Python file, or the outside program that this ``.toml`` describes.
     """
 
     name: str
@@ -47,9 +49,11 @@ def find_adapter(source: AdapterSource) -> type[Adapter]:
 
     Raises
     ------
-    BadConfig : no such name, file or class.
+    BadConfig : no such name, file or class, or a ``.toml`` that is not right.
     MethodFailed : the file raises when imported.
     """
+    if source.file.endswith(".toml"):
+        return external_adapter(Path(source.file))
     if source.file:
         return _from_file(Path(source.file), source.class_name)
     adapters = available_adapters()
@@ -62,16 +66,22 @@ def find_adapter(source: AdapterSource) -> type[Adapter]:
 
 
 def source_from_option(option: str) -> AdapterSource:
-    """``path/to/file.py`` or ``path/to/file.py:Class`` as a source with the adapter's own name.
+    """``FILE.py``, ``FILE.py:Class`` or a path to an ``adapter.toml`` as a source with the adapter's own name.
 
     Raises
     ------
-    BadConfig : not a readable Python file, or not exactly one adapter in it and no class named.
+    BadConfig : no readable file, or not exactly one adapter in it and no class named.
     """
     path, _, class_name = option.partition(":")
     file = Path(path).expanduser().resolve()
-    if not file.is_file() or file.suffix != ".py":
-        raise BadConfig(f"no Python file at {path}", where="--adapter", remedy="give FILE.py or FILE.py:Class")
+    if not file.is_file() or file.suffix not in (".py", ".toml"):
+        raise BadConfig(
+            f"no Python file and no adapter.toml at {path}",
+            where="--adapter",
+            remedy="give FILE.py, FILE.py:Class or FOLDER/adapter.toml",
+        )
+    if file.suffix == ".toml":
+        return AdapterSource(external_adapter(file).name, str(file))
     adapter = _from_file(file, class_name)
     return AdapterSource(adapter.name or file.stem, str(file), adapter.__name__)
 

@@ -10,7 +10,7 @@ Copy this file next to your code, write a module with one function::
 and let ``adapter.toml`` start ``python worker.py my_code.py``. What your code prints goes to the log.
 
 Your functions get motions (class ``Motion`` below) and answer with the pair ``(rotations_wxyz, root_xyz_m)``, a
-``Motion``, a dictionary with these two keys, or the path of a .bvh file on the same joints in centimetres; as many
+``Motion``, a dictionary with these keys, or the path of a .bvh file on the same joints in centimetres; as many
 frames as the content motion has.
 
 Functions that your module may have; only those that adapter.toml names are called. ``seed``, ``budget``,
@@ -18,6 +18,7 @@ Functions that your module may have; only those that adapter.toml names are call
 
     transfer(content, style)              transfer_batch(pairs)  -> list, where many at once are faster
     sample(content, style_label)          interpolate(content, styles)      styles: list of (motion, weight)
+    interpolate_parts(content, part, styles)    the same for one body part; the rest stays the content's
     transfer_parts(content, styles)       styles: dictionary body part -> motion
     open_stream(style)                    -> function (rotations_wxyz, root_xyz_m) of one frame -> the same two
     predict(past, style, trajectory_xz_m) -> the frames that follow
@@ -54,11 +55,13 @@ CALLS = {
     "transfers": ("transfer", "transfer_batch"),
     "samples": ("sample",),
     "interpolates": ("interpolate",),
+    "interpolates parts": ("interpolate_parts",),
     "transfers parts": ("transfer_parts",),
     "streams": ("open_stream",),
     "predicts": ("predict",),
     "describes": ("describe",),
 }
+ARRAYS = ("rotations_wxyz", "root_xyz_m", "offsets_m")
 KEPT_MOTIONS = 256
 CENTIMETRE_M = 0.01
 
@@ -304,6 +307,10 @@ class Worker:
         styles = [(self._motion(style), weight) for style, weight in request["styles"]]
         return self._one(request, "interpolate", self._motion(request["content"]), styles)
 
+    def _on_interpolate_parts(self, request: dict[str, Any]) -> dict[str, Any]:
+        styles = [(self._motion(style), weight) for style, weight in request["styles"]]
+        return self._one(request, "interpolate_parts", self._motion(request["content"]), request["part"], styles)
+
     def _on_transfer_parts(self, request: dict[str, Any]) -> dict[str, Any]:
         styles = {part: self._motion(style) for part, style in request["styles"].items()}
         return self._one(request, "transfer_parts", self._motion(request["content"]), styles)
@@ -380,7 +387,7 @@ class Worker:
         if path.endswith(".bvh"):
             return read_bvh(path)
         with numpy.load(path, allow_pickle=False) as file:
-            arrays = [file[name] for name in ("rotations_wxyz", "root_xyz_m", "offsets_m")]
+            arrays = [file[name] for name in ARRAYS]
         return Motion(arrays[0], arrays[1], arrays[2], self.names, self.parents, fps, path=path)
 
     def _keep(self, answer: Any, name: str) -> str:
@@ -388,14 +395,15 @@ class Worker:
         if isinstance(answer, (str, os.PathLike)):
             shutil.copyfile(os.fspath(answer), str(self.exchange / (name + ".bvh")))
             return name + ".bvh"
-        if isinstance(answer, Motion):
-            answer = answer.rotations_wxyz, answer.root_xyz_m
-        elif isinstance(answer, dict):
-            answer = answer["rotations_wxyz"], answer["root_xyz_m"]
-        if not isinstance(answer, (tuple, list)) or len(answer) != 2:
+        if isinstance(answer, (tuple, list)) and len(answer) == 2:
+            answer = {"rotations_wxyz": answer[0], "root_xyz_m": answer[1]}
+        elif isinstance(answer, Motion):
+            answer = vars(answer)
+        if not isinstance(answer, dict):
             raise TypeError(f"answer with (rotations_wxyz, root_xyz_m), got {type(answer).__name__}")
-        turns, root = (_as_array(values) for values in answer)
-        numpy.savez(str(self.exchange / (name + ".npz")), rotations_wxyz=turns, root_xyz_m=root)
+        wanted = ARRAYS if "offsets_m" in answer else ARRAYS[:2]
+        arrays = {key: _as_array(answer[key]) for key in wanted}
+        numpy.savez(str(self.exchange / (name + ".npz")), **arrays)
         return name + ".npz"
 
 

@@ -48,7 +48,20 @@ def test_file_that_raises_is_a_failed_method(tmp_path: Path) -> None:
 
 
 def test_missing_files_and_unknown_names_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadConfig, match="no Python file at"):
+    with pytest.raises(BadConfig, match=r"no Python file and no adapter\.toml at"):
         source_from_option(str(tmp_path / "none.py"))
     with pytest.raises(BadConfig, match=r"unknown method 'holden'.*copy-content"):
         find_adapter(AdapterSource("holden"))
+
+
+def test_path_to_a_toml_file_is_an_outside_program(tmp_path: Path) -> None:
+    file = tmp_path / "adapter.toml"
+    file.write_text('name = "outside"\ncommand = ["python", "x.py"]\ncapabilities = ["transfers"]\n')
+    source = source_from_option(str(file))
+    assert (source.name, source.class_name) == ("outside", "")
+    adapter = find_adapter(source)
+    assert adapter.capabilities() == ("transfers",)
+    assert not adapter.fits()
+    file.write_text('name = "outside"\ncomand = []')
+    with pytest.raises(BadConfig, match=r"no key 'comand'.*did you mean 'command'"):
+        source_from_option(str(file))
