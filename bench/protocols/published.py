@@ -34,7 +34,7 @@ class Published:
     condition : what was measured, as far as the paper says.
     our_method : name of the same row here; empty where it is no method.
     our_metric : name in METRICS of the same quantity; empty where there is none.
-    our_slice : slice of that metric; empty for all samples.
+    our_slice : slice of that metric in records; after a colon the name in its details; empty where it is open.
     factor : ``value * factor`` is in the unit of ``our_metric``; None where no factor does it, or there is no metric.
     comparable : whether a difference to our number says anything.
     why : the reason; never empty where not comparable.

@@ -47,6 +47,7 @@ def find(table_id: str, method: str, metric: str) -> Published:
 def test_every_number_of_every_table_is_there() -> None:
     assert Counter(row.table_id for row in ALL) == NUMBERS_PER_TABLE
     assert len(ALL) == 255
+    assert tuple(row for table_id in NUMBERS_PER_TABLE for row in published_numbers(table_id)) == ALL
 
 
 def test_no_cell_of_a_table_stands_twice() -> None:
@@ -130,6 +131,16 @@ def test_frames_of_100style_add_up() -> None:
 def test_real_motion_is_an_anchor_row() -> None:
     real = [row for row in ALL if row.method.startswith("Real motions")]
     assert {row.our_method for row in real} == {"real-test"} <= set(ADAPTERS) and len(real) == 3
+
+
+def test_imitation_is_read_as_an_output() -> None:
+    rows = published_numbers("kuriyama2022.table1")
+    assert {row.our_method for row in rows} == {"gesture-imitation"}
+    assert find("kuriyama2022.table1", "Content sample", "content_error_mean").our_slice == "intra"
+    crossed = find("kuriyama2022.table1", "Style sample", "content_error_mean")
+    assert (crossed.our_metric, crossed.our_slice) == ("content_error", "intra:against_style_sample")
+    crossed = find("kuriyama2022.table1", "Content sample", "style_error_w25%")
+    assert (crossed.our_metric, crossed.our_slice) == ("style_error_worst_quarter", "intra:against_content_sample")
 
 
 def test_unknown_table_names_the_known_ones() -> None:
