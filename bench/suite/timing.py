@@ -9,7 +9,7 @@ import select
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -139,7 +139,7 @@ class _Member:
             self.collected.loaded = {"load_s": load_s, "harness_load_s": harness_load_s, "memory_mb": memory_mb}
 
     @contextlib.contextmanager
-    def watched(self) -> Any:
+    def watched(self) -> Iterator[None]:
         """A loss inside becomes this member's outcome and ends its process."""
         try:
             yield
@@ -191,7 +191,7 @@ class _Member:
             bytes_per_style=got.facts["bytes_per_style"],
             designed_input_frames=got.facts["designed_input_frames"],
             look_ahead_frames=got.look_ahead["frames"],
-            look_ahead_window=self.plan.look_ahead_window,
+            look_ahead_window=got.look_ahead["window"],
             look_ahead_to_the_end=got.look_ahead["to_the_end"],
             look_ahead_reason=got.look_ahead["reason"],
         )
@@ -206,7 +206,10 @@ class _Member:
             self.busy_s += time.monotonic() - begin
         self._watch_memory()
         line, self.buffer = self.buffer.split(b"\n", 1)
-        message: dict[str, Any] = json.loads(line)
+        try:
+            message: dict[str, Any] = json.loads(line)
+        except ValueError:
+            raise _Lost(Outcome("failed", "the method wrote into the harness's own pipe", self.log.name)) from None
         if "failed" in message:
             raise _Lost(Outcome(message["failed"], message["reason"], self.log.name))
         return message
@@ -252,7 +255,8 @@ class _Group:
     def alive(self) -> list[_Member]:
         return [member for member in self.members if member.outcome is None]
 
-    def run(self, report: Any) -> None:
+    def run(self, report: Callable[[str], None]) -> None:
+        """Everything that is asked of loaded members, one at a time."""
         names = ", ".join(member.job.source.name for member in self.alive)
         report(f"first calls of {names}")
         for member in self.alive:

@@ -148,8 +148,15 @@ class TimingWorker:
         return {"ns": durations[settling:], "overhead_ns": overhead[settling:], "opening_ns": block.opening_ns}
 
     def _look_ahead(self) -> dict[str, Any]:
-        found = LookAhead(0) if self.ready.streams else measured_look_ahead(*self.ready.look_ahead_call())
-        return {"frames": found.frames, "to_the_end": found.to_the_end, "reason": found.reason}
+        """Later frames that an answer waits for; a stream has answered before they come."""
+        transfer, clip = self.ready.look_ahead_call()
+        found = LookAhead(0) if self.ready.streams else measured_look_ahead(transfer, clip)
+        return {
+            "frames": found.frames,
+            "window": clip.n_frames,
+            "to_the_end": found.to_the_end,
+            "reason": found.reason,
+        }
 
     def _facts(self) -> dict[str, Any]:
         traits = self.adapter.traits
