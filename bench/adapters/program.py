@@ -93,7 +93,8 @@ class Program(_Table):
                 )
             found |= matches
         if not self.files:
-            found |= {path for word in self.command if (path := self.working_folder / word).is_file()}
+            beside = [self.working_folder / word for word in self.command[1:] if not word.startswith("/")]
+            found |= {path for path in beside if path.is_file()}
         return tuple(sorted(found))
 
     def command_line(self, exchange: Path) -> list[str]:

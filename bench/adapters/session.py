@@ -225,7 +225,7 @@ class Session:
 
     def _death(self, call: str) -> MethodFailed:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self.process.wait(1.0)
+            self.process.wait(3.0)
         code = self.process.returncode
         if code is None:
             return self._violation(f"closed its output during {call!r}", "it closed stdout, which it must keep open")
