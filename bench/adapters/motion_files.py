@@ -56,10 +56,11 @@ def read_bounded(folder: Path, name: str, max_bytes: int) -> bytes:
         handle = _open_without_links(folder, name)
     except (OSError, ValueError) as error:
         raise BadFile(f"cannot be read ({_reason(error)})", where=where, remedy="links are never followed") from None
+    status = os.fstat(handle)
+    if not stat.S_ISREG(status.st_mode):
+        os.close(handle)
+        raise BadFile("is not a regular file", where=where)
     with os.fdopen(handle, "rb") as file:
-        status = os.fstat(file.fileno())
-        if not stat.S_ISREG(status.st_mode):
-            raise BadFile("is not a regular file", where=where)
         if status.st_size > max_bytes:
             problem = f"has {status.st_size} bytes, at most {max_bytes} can belong to what is expected here"
             raise BadFile(problem, where=where, cause="more frames than were asked for, or other data")
