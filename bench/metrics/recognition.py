@@ -58,16 +58,21 @@ def correct(true: ArrayLike, predicted: ArrayLike) -> BoolArray:
 def top_k_correct(true: ArrayLike, log_probabilities: ArrayLike, k: int) -> BoolArray:
     """Whether the true class ``[n]`` is among the ``k`` most probable of ``log_probabilities`` ``[n, C]``: ``[n]``.
 
-    Of equally probable classes the one with the lower index counts as the more probable.
+    Of equally probable classes the one with the lower index counts as the more probable, as in ``argmax``.
 
     Raises
     ------
-    BadInput : NaN (minus infinity is allowed), labels outside 0..C-1, k outside 1..C.
+    BadInput : not ``[n, C]``, NaN (minus infinity is allowed), another number of labels, labels that are not integers
+        in 0..C-1, k outside 1..C.
     """
     scores = np.asarray(log_probabilities, dtype=np.float64)
-    if scores.ndim != 2 or 0 in scores.shape or np.isnan(scores).any() or np.isposinf(scores).any():
+    if scores.ndim != 2 or 0 in scores.shape:
         raise BadInput(
-            f"log_probabilities must be [n, classes] without NaN or +Inf, got shape {list(scores.shape)}",
+            f"log_probabilities must have shape [n, classes], got {list(scores.shape)}", where="log_probabilities"
+        )
+    if n_bad := int((np.isnan(scores) | np.isposinf(scores)).sum()):
+        raise BadInput(
+            f"log_probabilities must be finite or -Inf, got {n_bad} NaN or +Inf of {scores.size} values",
             where="log_probabilities",
         )
     labels = check_labels(true, "true", len(scores))

@@ -9,6 +9,7 @@ import pytest
 
 from bench.arrays import FloatArray
 from bench.errors import BadConfig, BadInput
+from bench.metrics.dtw import Backend
 from bench.metrics.gesture import (
     ErrorSummary,
     Frame,
@@ -66,6 +67,12 @@ def test_content_error_backends_agree_on_a_plain_pair(rng: np.random.Generator) 
     other = smooth(44, rng)
     exact = content_error_components(hands, other).sum()
     assert content_error_components(hands, other, "fastdtw").sum() >= exact * (1.0 - 1e-12)
+
+
+def test_content_error_is_the_same_from_either_side(rng: np.random.Generator) -> None:
+    hands, other = smooth(40, rng), smooth(55, rng)
+    there, back = content_error_components(hands, other), content_error_components(other, hands)
+    assert np.sort(back) == pytest.approx(np.sort(there)) and there.sum() > 0.1
 
 
 def test_perfect_style_costs_nothing(rng: np.random.Generator) -> None:
@@ -163,6 +170,29 @@ def test_summary_by_hand() -> None:
     assert summarise([2.0]) == ErrorSummary(2.0, 2.0, 2.0)
 
 
+def test_summary_ignores_order_scales_and_grows_with_every_component() -> None:
+    components = np.random.default_rng(3).uniform(0.0, 1.0, 21)
+    plain, shuffled, doubled = (summarise(c) for c in (components, components[::-1], 2.0 * components))
+    assert shuffled.mean == pytest.approx(plain.mean) and shuffled.worst_quarter == pytest.approx(plain.worst_quarter)
+    assert (doubled.mean, doubled.worst) == pytest.approx((2.0 * plain.mean, 2.0 * plain.worst))
+    assert plain.mean < plain.worst_quarter < plain.worst
+    components[components.argmax()] += 1.0
+    worse = summarise(components)
+    assert worse.mean > plain.mean and worse.worst_quarter > plain.worst_quarter and worse.worst > plain.worst
+    assert summarise(np.zeros(5)) == ErrorSummary(0.0, 0.0, 0.0)
+
+
+def test_hands_by_hand() -> None:
+    """A body that faces +X: what is ahead of it is its local z, what is to its left its local x."""
+    positions = np.zeros((1, 21, 3))
+    positions[:, (skeleton.LEFT_UP_LEG, skeleton.LEFT_ARM), 2] = -0.2
+    positions[:, (skeleton.RIGHT_UP_LEG, skeleton.RIGHT_ARM), 2] = 0.2
+    positions[0, skeleton.LEFT_HAND], positions[0, skeleton.RIGHT_HAND] = (0.3, 1.2, -0.4), (0.1, 0.9, 0.5)
+    positions += np.array([7.0, 0.0, 8.0])
+    assert hand_trajectories(positions)[0] == pytest.approx([0.4, 1.2, 0.3, -0.5, 0.9, 0.1])
+    assert hand_trajectories(positions, "world")[0] == pytest.approx([7.3, 1.2, 7.6, 7.1, 0.9, 8.5])
+
+
 def body(frames: int, rng: np.random.Generator) -> FloatArray:
     positions = rng.standard_normal((frames, 21, 3))
     positions[:, (skeleton.LEFT_UP_LEG, skeleton.LEFT_ARM), 0] += 5.0
@@ -237,6 +267,10 @@ def test_refuses_unknown_options() -> None:
         style_error_components(GOOD, GOOD, 60.0, tail=cast(Tail, "wrap"))
     with pytest.raises(BadConfig, match="frame"):
         hand_trajectories(np.zeros((2, 21, 3)), cast(Frame, "pelvis"))
+    with pytest.raises(BadConfig, match="backend"):
+        content_error_components(GOOD, GOOD, cast(Backend, "slow"))
+    with pytest.raises(BadConfig, match="tail"):
+        segment_starts(10, 4, cast(Tail, "wrap"))
 
 
 @pytest.mark.parametrize("bad", [[], [[1.0]], [np.nan], [-1.0, 2.0]])
@@ -249,3 +283,10 @@ def test_refuses_components_that_are_no_errors(bad: list[float]) -> None:
 def test_refuses_positions_of_another_shape(shape: tuple[int, ...]) -> None:
     with pytest.raises(BadInput, match="positions_m"):
         hand_trajectories(np.zeros(shape))
+
+
+def test_refuses_positions_that_are_not_finite() -> None:
+    positions = np.zeros((3, 21, 3))
+    positions[1, 4, 2] = np.nan
+    with pytest.raises(BadInput, match="positions_m must be finite, got 1 NaN"):
+        hand_trajectories(positions)

@@ -124,6 +124,31 @@ def test_recognition_ignores_the_order_of_samples() -> None:
     assert end_recognition_percent(*backwards) == 50.0
 
 
+def test_log_odds_change_sign_with_the_classes_and_grow_with_the_target() -> None:
+    scores = np.random.default_rng(3).standard_normal((7, 4))
+    there = target_log_odds(scores, 1, 3)
+    assert target_log_odds(scores, 3, 1) == pytest.approx(-there)
+    surer = scores + np.array([0.0, 0.0, 0.0, 0.5])
+    assert target_log_odds(surer, 1, 3) == pytest.approx(there + 0.5)
+
+
+def test_monotonicity_is_perfect_on_any_rise() -> None:
+    steps = np.random.default_rng(4).uniform(0.01, 5.0, (20, 5))
+    assert monotonicity(WEIGHTS, np.cumsum(steps, axis=1)) == pytest.approx(np.ones(20))
+
+
+def test_end_recognition_falls_with_the_fault() -> None:
+    contents, starts, targets = np.zeros(4, dtype=int), np.zeros(4, dtype=int), np.ones(4, dtype=int)
+    seen_contents, seen_styles = np.zeros((4, 5), dtype=int), np.tile([0, 0, 0, 1, 1], (4, 1))
+    shares = []
+    for wrong in range(4):
+        seen_styles[:wrong, -1] = 2
+        shares.append(end_recognition_percent(seen_contents, seen_styles, contents, starts, targets))
+    seen_contents[:, 0] = 1
+    shares.append(end_recognition_percent(seen_contents, seen_styles, contents, starts, targets))
+    assert shares == [100.0, 87.5, 75.0, 62.5, 12.5]
+
+
 def test_recognition_falls_with_the_fault() -> None:
     contents = np.zeros(4, dtype=int)
     seen = np.zeros((4, 5), dtype=int)
@@ -179,8 +204,10 @@ def test_refuses_predictions_that_are_no_labels(bad: Any) -> None:
 
 @pytest.mark.parametrize("bad", [[], [0], [0, 1, 2], [0.5, 1.0], [0, -1]])
 def test_refuses_labels_that_do_not_fit(bad: Any) -> None:
-    with pytest.raises(BadInput, match="contents"):
+    with pytest.raises(BadInput, match=r"^contents: "):
         middle_content_percent(SEEN_CONTENTS, bad)
+    with pytest.raises(BadInput, match=r"^contents: "):
+        end_recognition_percent(SEEN_CONTENTS, SEEN_STYLES, bad, STARTS, TARGETS)
     with pytest.raises(BadInput, match="start_styles"):
         end_recognition_percent(SEEN_CONTENTS, SEEN_STYLES, CONTENTS, bad, TARGETS)
     with pytest.raises(BadInput, match="target_styles"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import cast
 
 import numpy as np
@@ -81,6 +82,23 @@ def test_leak_ratio_by_hand() -> None:
     assert leak_ratio(displacement, (0, 1), virtual=(1,)) == pytest.approx(0.75)
     assert leak_ratio(displacement, (2, 3)) == pytest.approx(2.0)
     assert leak_ratio(3.0 * np.array(displacement), (0, 1)) == pytest.approx(0.5)
+
+
+def test_lists_grow_with_displacement_and_ignore_what_lies_below() -> None:
+    displacement = np.random.default_rng(0).uniform(0.0, 0.2, 21)
+    lists = [joints_above(scale * displacement, 0.1) for scale in (0.0, 0.6, 1.0, 9.0)]
+    assert lists[0] == () and all(set(a) <= set(b) for a, b in itertools.pairwise(lists))
+    assert len(lists[1]) < len(lists[2]) < len(lists[3])
+    assert joints_above(np.minimum(displacement, 0.1), 0.1) == ()
+    mirrored = joints_above(displacement[::-1], 0.1)
+    assert tuple(sorted(20 - joint for joint in mirrored)) == lists[2]
+
+
+def test_swapping_inside_and_outside_inverts_the_ratio() -> None:
+    displacement = np.random.default_rng(1).uniform(0.1, 1.0, 21)
+    inside = PARTS["legs"]
+    outside = tuple(joint for joint in range(21) if joint not in inside)
+    assert leak_ratio(displacement, outside) == pytest.approx(1.0 / leak_ratio(displacement, inside))
 
 
 def test_a_splice_of_one_part_does_not_leak(source: FloatArray) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
 
 from bench.arrays import FloatArray
-from bench.errors import BadInput
+from bench.errors import BadConfig, BadInput
+from bench.metrics.dtw import Backend
 from bench.metrics.paired import paired_errors, position_errors_cm, rotation_errors_deg
 from bench.motion.quat import about_y, angle_between, multiply, normalise
 
@@ -53,6 +56,14 @@ def test_position_errors_by_hand() -> None:
     output[0, 1] = 0.03, 0.0, 0.04
     assert position_errors_cm(true, output).tolist() == [[0.0, pytest.approx(5.0)]]
     assert position_errors_cm(output + 9.0, true + 9.0) == pytest.approx(position_errors_cm(true, output))
+
+
+def test_position_errors_ignore_order_and_grow_with_the_fault(rng: np.random.Generator) -> None:
+    true, noise = rng.standard_normal((5, 3, 3)), rng.standard_normal((5, 3, 3))
+    assert np.all(position_errors_cm(true, true) == 0.0)
+    assert position_errors_cm(true + noise, true) == pytest.approx(position_errors_cm(true, true + noise))
+    means = [position_errors_cm(true, true + scale * noise).mean() for scale in (0.1, 0.2, 0.8)]
+    assert means[1] == pytest.approx(2.0 * means[0]) and means[2] == pytest.approx(8.0 * means[0])
 
 
 def motion(frames: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -137,6 +148,11 @@ def test_refuses_what_are_no_positions(bad: FloatArray) -> None:
             function(bad, PLACES)
         with pytest.raises(BadInput, match="output_positions_m"):
             function(PLACES, bad)
+
+
+def test_refuses_an_unknown_backend() -> None:
+    with pytest.raises(BadConfig, match="backend"):
+        paired_errors(TURNS, TURNS, PLACES, PLACES, cast(Backend, "slow"))
 
 
 def test_refuses_different_lengths_and_skeletons() -> None:

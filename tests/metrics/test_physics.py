@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -181,6 +183,150 @@ def test_floor_penetration_and_float() -> None:
     np.testing.assert_allclose(float_height(positions, [1, 2], floor_m=-0.02), 6.0)
     positions[0, 0, 1, 1] = -5.0
     assert estimated_floor(positions, [1, 2])[0] > -0.05
+
+
+def test_speed_ignores_place_and_turn_and_grows_with_the_motion() -> None:
+    motion = some_motion()
+    plain = speed_per_sample(motion, FPS)
+    np.testing.assert_allclose(speed_per_sample(turned(motion, 0.7) + 5.0, FPS), plain, rtol=1e-9)
+    np.testing.assert_allclose(speed_per_sample(motion[:, ::-1], FPS), plain)
+    np.testing.assert_allclose(speed_per_sample(3.0 * motion, 2.0 * FPS), 6.0 * plain)
+    assert (speed_per_sample(np.repeat(motion[:, :1], 5, axis=1), FPS) == 0.0).all()
+
+
+def test_ratios_ignore_the_order_of_samples_and_common_units() -> None:
+    rng = np.random.default_rng(6)
+    real, output, contents = rng.uniform(1.0, 2.0, 30), rng.uniform(1.0, 2.0, 20), rng.integers(0, 3, 30)
+    plain = ratio_to_reference(real, output)
+    assert ratio_to_reference(7.0 * real[::-1], 7.0 * output[::-1]) == pytest.approx(plain)
+    assert ratio_to_reference(real, 2.0 * output) == pytest.approx(2.0 * plain)
+    assert ratio_per_content(real, contents, real, contents) == {0: 1.0, 1: 1.0, 2: 1.0}
+
+
+def test_feet_on_the_floor_are_perfect_and_faults_add_up() -> None:
+    still = sliding_foot(0.0)
+    for value in (foot_skate(still, FPS, [1, 2]), skate_gmd(still, FPS, [1, 2])):
+        assert value.tolist() == [0.0]
+    assert penetration(still, [1, 2]).tolist() == float_height(still, [1, 2]).tolist() == [0.0]
+    heights = (0.0, 0.01, 0.05, 0.2)
+    deep = [penetration(sliding_foot(0.0, height_m=-h), [1])[0] for h in heights]
+    high = [float_height(sliding_foot(0.0, height_m=h), [1])[0] for h in heights]
+    np.testing.assert_allclose(deep, high)
+    np.testing.assert_allclose(deep, [0.0, 1.0, 5.0, 20.0])
+    shares = []
+    for frames in (0, 10, 30):
+        positions = sliding_foot(1.0)
+        positions[0, frames:, 1, 0] = positions[0, frames, 1, 0]
+        shares.append(skate_gmd(positions, FPS, [1, 2])[0])
+    assert shares[0] == 0.0 < shares[1] < shares[2]
+
+
+def test_feet_ignore_where_on_the_floor_and_which_way() -> None:
+    positions = sliding_foot(0.8)
+    moved = turned(positions, 1.2) + np.array([3.0, 0.0, -4.0])
+    for measure in (skate_gmd, foot_skate):
+        np.testing.assert_allclose(measure(moved, FPS, [1, 2]), measure(positions, FPS, [1, 2]))
+    sunk = turned(sliding_foot(0.8, height_m=-0.03), 1.2) + np.array([3.0, 0.0, -4.0])
+    np.testing.assert_allclose(penetration(sunk, [1]), 3.0)
+    np.testing.assert_allclose(estimated_floor(sunk, [1]), -0.03)
+    np.testing.assert_allclose(float_height(sunk, [1], floor_m=-0.05), 2.0)
+
+
+def bad_fps(fps: float) -> list[Callable[[], object]]:
+    motion = some_motion()
+    return [
+        lambda: jerk_per_sample(motion, fps),
+        lambda: speed_per_sample(motion, fps),
+        lambda: foot_skate(motion, fps, [1]),
+        lambda: skate_gmd(motion, fps, [1]),
+    ]
+
+
+@pytest.mark.parametrize("fps", [0.0, -30.0, float("nan"), float("inf")])
+def test_refuses_a_frame_rate_that_is_none(fps: float) -> None:
+    for call in bad_fps(fps):
+        with pytest.raises(BadInput, match=r"^fps: fps must be positive"):
+            call()
+
+
+POSITION_FUNCTIONS: list[tuple[Callable[[FloatArray], object], int]] = [
+    (lambda p: jerk_per_sample(p, FPS), 4),
+    (lambda p: speed_per_sample(p, FPS), 2),
+    (lambda p: bone_drift(p, (-1, 0, 1, 2, 3), np.ones(5)), 1),
+    (lambda p: estimated_floor(p, [1]), 1),
+    (lambda p: foot_skate(p, FPS, [1]), 2),
+    (lambda p: skate_gmd(p, FPS, [1]), 2),
+    (lambda p: penetration(p, [1]), 1),
+    (lambda p: float_height(p, [1]), 1),
+]
+
+
+@pytest.mark.parametrize(("function", "min_frames"), POSITION_FUNCTIONS)
+def test_refuses_what_is_no_motion(function: Callable[[FloatArray], object], min_frames: int) -> None:
+    motion = some_motion()
+    function(motion[:, :min_frames])
+    broken = motion.copy()
+    broken[1, 2, 3, 0] = np.inf
+    with pytest.raises(BadInput, match=r"^positions_m: positions_m must be finite, got 1 NaN or Inf"):
+        function(broken)
+    for shape in ((3, 40, 5), (3, 40, 5, 2), (0, 40, 5, 3), (3, 0, 5, 3)):
+        with pytest.raises(BadInput, match=r"^positions_m: positions_m must have shape \[any, any, any, 3\]"):
+            function(np.zeros(shape))
+    if min_frames > 1:
+        with pytest.raises(BadInput, match=f"positions_m must have at least {min_frames} frames, got {min_frames - 1}"):
+            function(motion[:, : min_frames - 1])
+
+
+JOINT_FUNCTIONS: list[Callable[[FloatArray, list[int]], object]] = [
+    lambda p, joints: jerk_per_sample(p, FPS, joints=joints),
+    lambda p, joints: speed_per_sample(p, FPS, joints=joints),
+    lambda p, joints: time_correlation(p, p, joints=joints),
+    lambda p, joints: bone_drift(p, (-1, 0, 1, 2, 3), np.ones(5), joints=joints),
+    estimated_floor,
+    lambda p, joints: foot_skate(p, FPS, joints),
+    lambda p, joints: skate_gmd(p, FPS, joints),
+    penetration,
+    float_height,
+]
+
+
+@pytest.mark.parametrize("function", JOINT_FUNCTIONS)
+@pytest.mark.parametrize("joints", [[5], [-1], [1, 1], []])
+def test_refuses_joints_that_do_not_exist(
+    function: Callable[[FloatArray, list[int]], object], joints: list[int]
+) -> None:
+    with pytest.raises(BadInput, match=r"^joints: joints must be different indices in 0\.\.4"):
+        function(some_motion(), joints)
+
+
+def test_refuses_pairs_that_do_not_fit() -> None:
+    motion = some_motion()
+    broken = np.full_like(motion, np.nan)
+    with pytest.raises(BadInput, match=r"^source_positions_m: .* must be finite"):
+        time_correlation(broken, motion)
+    with pytest.raises(BadInput, match=r"^output_positions_m: .* must be finite"):
+        time_correlation(motion, broken)
+    with pytest.raises(BadInput, match=r"^source_positions_m: .* at least 2 frames, got 1"):
+        time_correlation(motion[:, :1], motion[:, :1])
+    with pytest.raises(
+        BadInput, match=r"^output_positions_m: .* match the source's \[3, 40, 5, 3\], got \[2, 40, 5, 3\]"
+    ):
+        time_correlation(motion, motion[:2])
+    with pytest.raises(BadInput, match=r"^reference_lengths_m: .* must be finite"):
+        bone_drift(motion, (-1, 0, 1, 2, 3), np.full(5, np.nan))
+    for good, bad in ((1.0, np.nan), (1.0, -1.0)):
+        with pytest.raises(BadInput, match=r"^reference: "):
+            ratio_to_reference([bad], [good])
+        with pytest.raises(BadInput, match=r"^output: "):
+            ratio_to_reference([good], [bad])
+    with pytest.raises(BadInput, match=r"^reference_contents: .* must have shape \[2\], got \[1\]"):
+        ratio_per_content([1.0, 1.0], [0], [1.0], [0])
+    with pytest.raises(BadInput, match=r"^output_contents: .* must be integer labels"):
+        ratio_per_content([1.0], [0], [1.0], [0.5])
+    with pytest.raises(BadInput, match=r"^reference: .* must not be negative"):
+        ratio_per_content([-1.0], [0], [1.0], [0])
+    with pytest.raises(BadInput, match=r"^output: .* must not be negative"):
+        ratio_per_content([1.0], [0], [-1.0], [0])
 
 
 def test_refusals() -> None:

@@ -69,6 +69,20 @@ def test_mean_pose_on_the_fit_part_has_error_one(rng: np.random.Generator) -> No
     assert next_frame_error(fit, mean_pose_prediction(statistics, 200), statistics) == pytest.approx(1.0)
 
 
+def test_statistics_ignore_the_order_of_frames(rng: np.random.Generator) -> None:
+    fit = rng.standard_normal((50, 3)) * np.array([1.0, 5.0, 0.0])
+    there, back = feature_statistics(fit), feature_statistics(fit[::-1])
+    assert back.mean == pytest.approx(there.mean) and back.std == pytest.approx(there.std)
+    assert back.varies.tolist() == there.varies.tolist() == [True, True, False]
+
+
+def test_the_last_pose_repeated_is_worse_the_later_it_is_asked(rng: np.random.Generator) -> None:
+    walk = np.cumsum(rng.uniform(0.1, 1.0, (40, 2)), axis=0)
+    held = repeat_last_prediction(walk[:10], 30)
+    errors = [next_frame_error(walk[t : t + 1], held[t - 10 : t - 9], STATISTICS) for t in (10, 15, 30)]
+    assert 0.0 < errors[0] < errors[1] < errors[2]
+
+
 def test_baselines_by_hand() -> None:
     assert mean_pose_prediction(STATISTICS, 1).tolist() == [[1.0, 5.0]]
     assert mean_pose_prediction(STATISTICS, 2).tolist() == [[1.0, 5.0], [1.0, 5.0]]
@@ -118,9 +132,18 @@ def test_refuses_different_lengths() -> None:
         next_frame_error(FRAMES, FRAMES[:3], STATISTICS)
 
 
-@pytest.mark.parametrize("bad", [FRAMES[:1], FRAMES[:0], np.full((4, 2), np.nan), np.ones((4, 2))])
-def test_refuses_statistics_of_nothing(bad: FloatArray) -> None:
-    with pytest.raises(BadInput, match="features"):
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        (FRAMES[:1], "features needs at least 2 frames"),
+        (FRAMES[:0], r"features must have shape \[any, any\], got \[0, 2\]"),
+        (FRAMES[0], r"features must have shape \[any, any\], got \[2\]"),
+        (np.full((4, 2), np.nan), "features must be finite"),
+        (np.ones((4, 2)), "features are all constant over 4 frames"),
+    ],
+)
+def test_refuses_statistics_of_nothing(bad: FloatArray, message: str) -> None:
+    with pytest.raises(BadInput, match=message):
         feature_statistics(bad)
 
 
@@ -131,6 +154,8 @@ def test_refuses_no_frames_to_predict() -> None:
         repeat_last_prediction(FRAMES, 0)
     with pytest.raises(BadInput, match="past_features"):
         repeat_last_prediction(FRAMES[:0], 3)
+    with pytest.raises(BadInput, match="past_features"):
+        repeat_last_prediction(np.full((4, 2), np.nan), 3)
 
 
 @pytest.mark.parametrize("bad", [np.zeros((0, 3, 3)), np.zeros((3, 3)), np.full((1, 3, 3), np.inf)])
@@ -139,6 +164,12 @@ def test_refuses_what_are_no_positions(bad: FloatArray) -> None:
         bone_length_loss_m(bad, chain(1.0, 2.0), CHAIN)
     with pytest.raises(BadInput, match="predicted_positions_m"):
         bone_length_loss_m(chain(1.0, 2.0), bad, CHAIN)
+
+
+@pytest.mark.parametrize("other", [np.zeros((2, 3, 3)), np.zeros((1, 4, 3))])
+def test_refuses_motions_of_different_length_or_skeleton(other: FloatArray) -> None:
+    with pytest.raises(BadInput, match="predicted_positions_m"):
+        bone_length_loss_m(chain(1.0, 2.0), other, CHAIN)
 
 
 @pytest.mark.parametrize("parents", [(-1, 0), (-1, 0, 3), (-2, 0, 1), (-1, -1, -1)])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -149,8 +152,6 @@ def test_refusals() -> None:
         majority_rate_percent([])
     with pytest.raises(BadInput, match=r"true must lie in 0\.\.1, got 2"):
         confusion_matrix(TRUE, PREDICTED, 2)
-    with pytest.raises(BadInput, match="log_probabilities must be"):
-        top_k_correct([0], [[np.nan, 0.0]], 1)
     with pytest.raises(BadInput, match=r"k must lie in 1\.\.2, got 3"):
         top_k_correct([0], [[0.0, 0.0]], 3)
     with pytest.raises(BadInput, match="style_correct must have length 2, got 1"):
@@ -167,3 +168,133 @@ def test_refusals() -> None:
         over_judges([1.0, np.nan])
     with pytest.raises(BadInput, match=r"values must have shape \[judges, n\]"):
         share_of_judges([1.0])
+
+
+def test_top_k_is_perfect_where_the_right_class_leads_and_ignores_offsets_and_order() -> None:
+    rng = np.random.default_rng(1)
+    scores, true = rng.normal(size=(60, 6)), rng.integers(0, 6, 60)
+    leading = scores.copy()
+    leading[np.arange(60), true] = 10.0
+    assert top_k_correct(true, leading, 1).all()
+    last = scores.copy()
+    last[np.arange(60), true] = -np.inf
+    assert not top_k_correct(true, last, 5).any() and top_k_correct(true, last, 6).all()
+    plain = top_k_correct(true, scores, 3)
+    offset = rng.normal(size=(60, 1))
+    np.testing.assert_array_equal(top_k_correct(true, 2.0 * scores + offset, 3), plain)
+    np.testing.assert_array_equal(top_k_correct(true[::-1], scores[::-1], 3), plain[::-1])
+    classes = rng.permutation(6)
+    np.testing.assert_array_equal(top_k_correct(np.argsort(classes)[true], scores[:, classes], 3), plain)
+
+
+def test_top_k_ties_go_to_the_lower_index() -> None:
+    flat = np.zeros((5, 5))
+    assert [int(top_k_correct(np.arange(5), flat, k).sum()) for k in range(1, 6)] == [1, 2, 3, 4, 5]
+    assert top_k_correct(np.arange(5), flat, 3).tolist() == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("true", "scores", "k", "message"),
+    [
+        ([0, 1], [[0.0, 1.0]], 1, r"true must have shape \[1\], got \[2\]"),
+        ([2], [[0.0, 1.0]], 1, r"true must lie in 0\.\.1, got 2"),
+        ([-1], [[0.0, 1.0]], 1, "true must not be negative, got -1"),
+        ([0.0], [[0.0, 1.0]], 1, "true must be integer labels, got float64"),
+        ([[0.0, 1.0]], [0], 1, r"log_probabilities must have shape \[n, classes\], got \[1\]"),
+        ([], np.zeros((0, 2)), 1, r"log_probabilities must have shape \[n, classes\], got \[0, 2\]"),
+        ([0], [[np.nan, 1.0]], 1, r"log_probabilities must be finite or -Inf, got 1 NaN or \+Inf of 2 values"),
+        ([0], [[np.inf, np.nan]], 1, r"log_probabilities must be finite or -Inf, got 2 NaN or \+Inf of 2 values"),
+        ([0], [[0.0, 1.0]], 0, r"k must lie in 1\.\.2, got 0"),
+    ],
+)
+def test_top_k_refusals(true: Any, scores: Any, k: int, message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        top_k_correct(true, scores, k)
+
+
+def test_more_right_answers_never_lower_a_number() -> None:
+    rng = np.random.default_rng(2)
+    content, style, order = rng.random(50) < 0.5, rng.random(50) < 0.5, rng.permutation(50)
+    joint = []
+    for place in order:
+        content[place] = style[place] = True
+        joint.append(percent(joint_correct(content, style)).percent)
+    assert joint == sorted(joint) and joint[-1] == 100.0
+    assert percent(joint_correct(content[order], style[order])) == percent(joint_correct(content, style))
+
+
+def test_residue_grows_with_samples_left_as_they_were() -> None:
+    source, target = np.zeros(10, dtype=int), np.ones(10, dtype=int)
+    seen = [(np.arange(10) >= n).astype(int) for n in (0, 3, 10)]
+    shares = [percent(kept_source_style(source, target, labels)).percent for labels in seen]
+    assert shares == [0.0, 30.0, 100.0]
+    order = np.random.default_rng(0).permutation(10)
+    assert percent(kept_source_style(source, target, seen[1][order])).percent == 30.0
+
+
+def test_ensemble_ignores_the_order_of_judges() -> None:
+    assert over_judges([98.0, 90.0, 94.0]) == over_judges([90.0, 94.0, 98.0])
+    assert over_judges([90.0, 90.0]).sd == 0.0
+    rows = np.array([[True, False, True], [True, False, False]])
+    np.testing.assert_array_equal(share_of_judges(rows[::-1]), share_of_judges(rows))
+
+
+LABEL_PAIRS: list[tuple[Callable[[Any, Any], object], str, str]] = [
+    (correct, "true", "predicted"),
+    (balanced_accuracy_percent, "true", "predicted"),
+    (lambda true, seen: confusion_matrix(true, seen, 3), "true", "predicted"),
+    (
+        lambda true, seen: balanced_accuracy_replicates(true, seen, np.ones((2, 5), dtype=np.int32)),
+        "true",
+        "predicted",
+    ),
+    (lambda source, seen: kept_source_style(source, TRUE, seen), "source_styles", "predicted_styles"),
+    (lambda target, seen: kept_source_style(TRUE, target, seen), "target_styles", "predicted_styles"),
+]
+
+
+@pytest.mark.parametrize(("function", "first", "second"), LABEL_PAIRS)
+def test_every_argument_of_labels_is_checked(function: Callable[[Any, Any], object], first: str, second: str) -> None:
+    with pytest.raises(BadInput, match=f"^{first}: .* must be integer labels"):
+        function(TRUE * 1.0, PREDICTED)
+    with pytest.raises(BadInput, match=f"^{second}: .* must be integer labels"):
+        function(TRUE, PREDICTED * 1.0)
+    with pytest.raises(BadInput, match=f"^{first}: .* must not be negative, got -1"):
+        function(TRUE - 1, PREDICTED)
+    with pytest.raises(BadInput, match=f"^{second}: .* must not be negative, got -1"):
+        function(TRUE, PREDICTED - 1)
+    with pytest.raises(BadInput, match=rf"^{second}: .* must have shape \[5\], got \[4\]"):
+        function(TRUE, PREDICTED[:4])
+
+
+def test_refuses_values_that_are_no_shares() -> None:
+    for bad in ([], [[0.5]], [-0.1], [1.5]):
+        with pytest.raises(BadInput, match=r"^values: "):
+            percent(bad)
+        with pytest.raises(BadInput, match=r"^values: "):
+            per_condition(bad, {})
+        with pytest.raises(BadInput, match=r"^values: "):
+            per_class([0], bad)
+    with pytest.raises(BadInput, match=r"^true: true must have shape \[2\], got \[1\]"):
+        per_class([0], [0.5, 0.5])
+    with pytest.raises(BadInput, match=r"^conditions\['half'\]: .* must be booleans"):
+        per_condition([0.5, 1.0], {"half": [0, 1]})
+    with pytest.raises(BadInput, match=r"^values: values must have shape \[any\], got \[0\]"):
+        over_judges([])
+    with pytest.raises(BadInput, match=r"^values: values must lie in 0\.\.1"):
+        share_of_judges([[2.0]])
+    with pytest.raises(BadInput, match=r"^style_correct: .* must be booleans"):
+        joint_correct([True], [1])
+    with pytest.raises(BadInput, match=r"^predicted: predicted must lie in 0\.\.1, got 2"):
+        confusion_matrix([0, 1], [2, 0], 2)
+    bad_counts: list[Any] = [
+        np.ones((2, 4), dtype=int),
+        -np.ones((2, 5), dtype=int),
+        np.ones((2, 5)),
+        np.ones((0, 5), dtype=int),
+    ]
+    for counts in bad_counts:
+        with pytest.raises(BadInput, match=r"^counts: "):
+            balanced_accuracy_replicates(TRUE, PREDICTED, counts)
+    with pytest.raises(BadInput, match=r"^true: true must be integer labels"):
+        majority_rate_percent([0.5])

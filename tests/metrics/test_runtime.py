@@ -93,6 +93,24 @@ def test_startup_latency_by_hand() -> None:
     assert causal.designed_s == causal.measured_s == pytest.approx(1.0 / 60.0)
 
 
+def test_throughput_grows_with_frames_and_only_the_median_counts() -> None:
+    durations = np.array([0.2, 0.1, 0.3])
+    assert frames_per_second(durations, 120) == pytest.approx(2.0 * frames_per_second(durations, 60))
+    assert frames_per_second(durations[::-1], 60) == frames_per_second([0.2, 0.001, 9.0], 60) == pytest.approx(300.0)
+    assert real_time_factor(durations[::-1], 6, 30.0) == real_time_factor(durations, 6, 30.0) == pytest.approx(1.0)
+    assert (
+        deadline_miss_percent(durations[::-1], 4.0) == deadline_miss_percent(durations, 4.0) == pytest.approx(100 / 3)
+    )
+
+
+def test_startup_grows_with_input_and_look_ahead_and_shrinks_with_the_frame_rate() -> None:
+    designed = [startup_latency(frames, 0, 30.0).designed_s for frames in (1, 32, 64)]
+    measured = [startup_latency(1, frames, 30.0).measured_s for frames in (0, 1, 31)]
+    assert designed[0] < designed[1] < designed[2] == pytest.approx(64.0 * designed[0])
+    assert measured[0] < measured[1] < measured[2] == pytest.approx(32.0 * measured[0])
+    assert startup_latency(32, 5, 60.0).designed_s == pytest.approx(0.5 * startup_latency(32, 5, 30.0).designed_s)
+
+
 DURATION_FUNCTIONS: list[Callable[[Any], Any]] = [
     duration_statistics,
     lambda d: frames_per_second(d, 1),
@@ -122,6 +140,8 @@ def test_refuses_a_frame_rate_that_is_none(fps: float) -> None:
 def test_refuses_frame_counts_that_cannot_be() -> None:
     with pytest.raises(BadInput, match="frames_per_call"):
         frames_per_second([0.1, 0.1], 0)
+    with pytest.raises(BadInput, match="frames_per_call"):
+        real_time_factor([0.1, 0.1], -1, 30.0)
     with pytest.raises(BadInput, match="frames_per_call"):
         deadline_miss_percent([0.1, 0.1], 30.0, frames_per_call=0)
     with pytest.raises(BadInput, match="designed_input_frames"):
