@@ -48,7 +48,7 @@ def dtw(a: ArrayLike, b: ArrayLike, backend: Backend = "exact") -> DtwPath:
     """Align two trajectories in time.
 
     Swapping ``a`` and ``b`` leaves the exact cost as it is; where several paths cost the same, the tie rule may then
-    choose another one. The exact backend needs about n (n + m) / 4 bytes.
+    choose another one. The exact backend needs about n m / 4 bytes.
 
     Parameters
     ----------
@@ -83,18 +83,16 @@ def fastdtw_build() -> Literal["compiled", "pure-python"]:
 
 
 def _exact(a: FloatArray, b: FloatArray) -> tuple[IntArray, float]:
-    cost, directions = _dtw_kernels.fill(_channels_first(a), _channels_first(b[::-1]))
+    """Lay the frames out as the kernel reads them, channels first: whole strips of ``a``, ``b`` turned round."""
+    (n, k), m, lanes = a.shape, len(b), _dtw_kernels.LANES
+    strips = np.zeros((k, lanes * -(-n // lanes)))
+    strips[:, :n] = a.T
+    reversed_b = np.zeros((k, m + 2 * (lanes - 1)))
+    reversed_b[:, lanes - 1 : lanes - 1 + m] = b[::-1].T
+    cost, directions = _dtw_kernels.fill(strips, reversed_b, n, m)
     if not np.isfinite(cost):
         return np.zeros((0, 2), dtype=np.int64), cost
-    return _dtw_kernels.trace(directions, len(a), len(b)), float(cost)
-
-
-def _channels_first(trajectory: FloatArray) -> FloatArray:
-    """``[n, k]`` to contiguous ``[K, n]``; zero channels fill up to the kernel's groups of three."""
-    n, k = trajectory.shape
-    result = np.zeros((3 * -(-k // 3), n))
-    result[:k] = trajectory.T
-    return result
+    return _dtw_kernels.trace(directions, n, m), float(cost)
 
 
 def _fast(a: FloatArray, b: FloatArray) -> tuple[IntArray, float]:
