@@ -15,7 +15,7 @@ from bench import __version__, console
 from bench.errors import BadConfig, BenchError
 
 if TYPE_CHECKING:
-    from bench.suite.run import RunRequest
+    from bench.suite.request import RunRequest
 
 RUNS = Path("runs")
 STORE = RUNS / "store"
@@ -58,7 +58,10 @@ def run(
     ] = None,
     methods: Annotated[str, typer.Option(help="Comma-separated names; default: all anchor rows.")] = "",
     adapter: Annotated[list[str] | None, typer.Option(help="Your adapter, FILE.py or FILE.py:Class.")] = None,
-    tracks: Annotated[str, typer.Option(help="Comma-separated tracks.")] = "transfer",
+    tracks: Annotated[str, typer.Option(help="Comma-separated tracks; default: transfer.")] = "",
+    protocols: Annotated[
+        str, typer.Option(help="Comma-separated protocols, NAME@VERSION or NAME@VERSION/CONDITION.")
+    ] = "",
     profile: Annotated[str, typer.Option(help="smoke, quick (1000 samples) or standard (2500).")] = "quick",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<time>, and runs/latest.")] = None,
     store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
@@ -74,15 +77,17 @@ def run(
 
     Example: stylebench run --data bandai-namco=bandai.zip --methods copy-content,copy-style
     """
+    from bench.suite import request as asked
     from bench.suite import run as suite
 
-    request = suite.RunRequest(
+    request = asked.RunRequest(
         data=_data_options(data or ["procedural"]),
-        out=out or suite.default_out(RUNS),
+        out=out or asked.default_out(RUNS),
         store=store,
         methods=_names(methods),
         adapter_files=tuple(adapter or ()),
-        tracks=_names(tracks),
+        tracks=_names(tracks) or (() if protocols else ("transfer",)),
+        protocols=_names(protocols),
         profile=profile,
         jobs=jobs,
         seed=seed,
@@ -97,7 +102,9 @@ def run(
     with console.ProgressDisplay() as progress:
         result = suite.run(request, progress)
     if out is None:
-        suite.latest_link(request.out)
+        asked.latest_link(request.out)
+    for left in result.left_out:
+        console.complain(f"left out: {left}")
     failed = _report_run(request.out, as_json, f"{result.generated} cells generated, {result.scored} metrics computed")
     if failed:
         raise typer.Exit(1)
@@ -227,7 +234,7 @@ def _print_plan(request: RunRequest, as_json: bool) -> None:
     rows = [
         [
             setting.dataset.dataset_id,
-            setting.protocol.protocol_id,
+            setting.protocol.label,
             str(cost.cells),
             str(cost.to_generate),
             f"{cost.minutes:.1f}",

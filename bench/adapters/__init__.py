@@ -8,10 +8,13 @@ from bench.adapters.anchors import (
     CopyContent,
     CopyStyle,
     FrozenFrame,
+    LinearBlend,
     NoiseHigh,
     NoiseLow,
     NoiseMiddle,
     PoseAdain,
+    RepeatLast,
+    Splice,
 )
 from bench.adapters.base import Adapter
 from bench.adapters.fitted_anchors import ClassifyAndRetrieve, MeanPose, NearestPose, StyleMeanShift
@@ -28,6 +31,9 @@ ADAPTERS: dict[str, type[Adapter]] = {
         CopyStyle,
         CoinFlip,
         ConcatenatedHalves,
+        Splice,
+        LinearBlend,
+        RepeatLast,
         MeanPose,
         FrozenFrame,
         NoiseLow,

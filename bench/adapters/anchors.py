@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from bench.adapters.base import Adapter
+from bench.adapters.base import Adapter, Description, Stream
+from bench.arrays import FloatArray
 from bench.datasets.take import Take
 from bench.motion import quat
 from bench.motion.clip import Clip
+from bench.motion.edit import crop
+from bench.motion.kinematics import yaw_aligned
 from bench.motion.pose import (
     fitted_window,
     from_local_rotation_vectors,
@@ -17,6 +21,7 @@ from bench.motion.pose import (
     local_rotation_vectors,
     random_start,
 )
+from bench.motion.skeleton import PARTS
 
 LEAST_DEVIATION = 1e-3
 """Floor of a channel's standard deviation in pose AdaIN (radians, statures): still channels stay still."""
@@ -39,6 +44,33 @@ class CopyContent(Anchor):
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
         return content.clip
 
+    def sample(self, content: Take, style_label: str, *, rng: np.random.Generator) -> Clip:
+        return content.clip
+
+    def interpolate(self, content: Take, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator) -> Clip:
+        return content.clip
+
+    def interpolate_parts(
+        self, content: Take, part: str, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator
+    ) -> Clip:
+        return content.clip
+
+    def transfer_parts(self, content: Take, styles: Mapping[str, Take], *, rng: np.random.Generator) -> Clip:
+        return content.clip
+
+    def open_stream(self, style: Take, *, content_label: str | None, rng: np.random.Generator) -> Stream:
+        return _Identity()
+
+    def describe(self) -> Description:
+        return Description(parameters=0, bytes_per_style=0, designed_input_frames=1, look_ahead_frames=0)
+
+
+class _Identity:
+    """The stream that answers every pose with itself."""
+
+    def step(self, rotations_wxyz: FloatArray, root_xyz_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return rotations_wxyz, root_xyz_m
+
 
 class CopyStyle(Anchor):
     """Answers with a window of the style reference: full style, no content."""
@@ -50,6 +82,79 @@ class CopyStyle(Anchor):
 
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
         return fitted_window(style.clip, content.clip, random_start(style.clip, content.clip.n_frames, rng))
+
+    def interpolate(self, content: Take, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator) -> Clip:
+        return self.transfer(content, max(styles, key=lambda pair: pair[1])[0], rng=rng)
+
+    def transfer_parts(self, content: Take, styles: Mapping[str, Take], *, rng: np.random.Generator) -> Clip:
+        return self.transfer(content, next(iter(styles.values())), rng=rng)
+
+
+class Splice(Anchor):
+    """The style reference's joints in the part, the source's everywhere else: locality without sense."""
+
+    name = "splice"
+    title = "splice"
+    description = "joint rotations of a window of the style reference in the part, the source's elsewhere"
+    draws_from = "test"
+
+    def transfer_parts(self, content: Take, styles: Mapping[str, Take], *, rng: np.random.Generator) -> Clip:
+        clip = content.clip
+        for part, style in styles.items():
+            clip = spliced(clip, CopyStyle().transfer(content, style, rng=rng), PARTS[part])
+        return clip
+
+
+class LinearBlend(Anchor):
+    """Poses between windows of the styles, frame by frame: even, and without sense."""
+
+    name = "linear-blend"
+    title = "linear blend"
+    description = "joint rotations between windows of the two styles, frame by frame"
+    draws_from = "test"
+
+    def interpolate(self, content: Take, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator) -> Clip:
+        (first, _), (second, weight) = styles
+        start = rng.random()
+        start_clip, end_clip = (_at_share(style.clip, content.clip, start) for style in (first, second))
+        start_turned, start_yaw = heading_removed(start_clip)
+        end_turned, _ = heading_removed(end_clip)
+        mixed = quat.slerp(start_turned, end_turned, np.full(start_turned.shape[:2], weight))
+        root = start_clip.root_xyz_m + weight * (end_clip.root_xyz_m - start_clip.root_xyz_m)
+        rotations, _ = yaw_aligned(mixed, root, -start_yaw)
+        return content.clip.with_motion(rotations, root)
+
+    def interpolate_parts(
+        self, content: Take, part: str, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator
+    ) -> Clip:
+        return spliced(content.clip, self.interpolate(content, styles, rng=rng), PARTS[part])
+
+
+class RepeatLast(Anchor):
+    """The last pose again: hard to beat from one frame to the next."""
+
+    name = "repeat-last"
+    title = "repeat last frame"
+    description = "the last frame of the past, unchanged"
+    draws_from = "test"
+
+    def predict(self, past: Clip, style: Take, trajectory_xz_m: FloatArray) -> Clip:
+        return crop(past, past.n_frames - 1, 1)
+
+
+def spliced(clip: Clip, other: Clip, joints: Sequence[int]) -> Clip:
+    """``clip`` with the local rotations of some joints from ``other``; the root keeps its path and heading."""
+    rotations = clip.rotations_wxyz.copy()
+    turned, _ = heading_removed(other)
+    _, yaw = heading_removed(clip)
+    aligned, _ = yaw_aligned(turned, other.root_xyz_m, -yaw)
+    rotations[:, list(joints)] = aligned[:, list(joints)]
+    return clip.with_motion(rotations, clip.root_xyz_m)
+
+
+def _at_share(clip: Clip, like: Clip, share: float) -> Clip:
+    """The window that starts at a share of the possible starts: the same place for all weights of a mixture."""
+    return fitted_window(clip, like, int(share * max(clip.n_frames - like.n_frames, 0)))
 
 
 class CoinFlip(Anchor):
@@ -161,9 +266,7 @@ class PoseAdain(Anchor):
         return from_local_rotation_vectors(vectors, reference, yaw, root, source)
 
 
-def with_statistics_of(
-    values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], other: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
-) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def with_statistics_of(values: FloatArray, other: FloatArray) -> FloatArray:
     """``values`` ``[T, ...]`` shifted and scaled to the mean and deviation over time of ``other`` ``[T', ...]``."""
     deviation = np.maximum(values.std(axis=0), LEAST_DEVIATION)
     other_deviation = np.where(values.std(axis=0) > LEAST_DEVIATION, other.std(axis=0), 0.0)

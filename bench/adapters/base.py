@@ -31,6 +31,7 @@ CAPABILITIES: dict[str, str] = {
     "transfers": "transfer",
     "samples": "sample",
     "interpolates": "interpolate",
+    "interpolates parts": "interpolate_parts",
     "transfers parts": "transfer_parts",
     "streams": "open_stream",
     "predicts": "predict",
@@ -51,6 +52,8 @@ class Traits:
     """the style take's style label is passed instead of None"""
     designed_input_frames: int | None = None
     """window length the method was made for, at 30 fps"""
+    only_designed_input: bool = False
+    """answers windows of exactly that length only: longer contents are cut and joined again by the harness"""
     look_ahead_frames: int | None = None
     """future frames needed before a frame can be answered; None if the whole clip is"""
     trained_on: str = ""
@@ -112,6 +115,12 @@ class Adapter:
         """The content's motion in a mixture of styles; weights sum to 1, one style may be the source itself."""
         raise self._cannot("interpolates")
 
+    def interpolate_parts(
+        self, content: Take, part: str, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator
+    ) -> Clip:
+        """As :meth:`interpolate`, for one body part; the rest of the body stays the content's."""
+        raise self._cannot("interpolates parts")
+
     def transfer_parts(self, content: Take, styles: Mapping[str, Take], *, rng: np.random.Generator) -> Clip:
         """The content's motion with a style per body part (names in ``bench.motion.skeleton.PARTS``)."""
         raise self._cannot("transfers parts")
@@ -121,7 +130,11 @@ class Adapter:
         raise self._cannot("streams")
 
     def predict(self, past: Clip, style: Take, trajectory_xz_m: FloatArray) -> Clip:
-        """The next frame after ``past``, along a ground trajectory."""
+        """The next frame after ``past``, one frame long.
+
+        ``trajectory_xz_m`` ``[30, 2]`` is the root's path over the ground in the next second, the predicted frame
+        first. A method that predicts positions answers with a skeleton whose bones fit them.
+        """
         raise self._cannot("predicts")
 
     def describe(self) -> Description:

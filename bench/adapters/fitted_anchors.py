@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from bench.adapters.anchors import Anchor
 from bench.adapters.base import ProgressCallback, Traits
-from bench.adapters.window_bank import WindowBank, describe_window
+from bench.adapters.window_bank import WINDOW_FRAMES, WindowBank, describe_window
 from bench.arrays import FloatArray
 from bench.datasets.take import Take
 from bench.errors import BadData
 from bench.motion import quat
 from bench.motion.clip import Clip
+from bench.motion.edit import crop
 from bench.motion.pose import (
     from_local_rotation_vectors,
     heading_removed,
     local_rotation_vectors,
     onto_skeleton,
 )
+from bench.motion.skeleton import PARTS
 
 ARRAYS_FILE = "arrays.npz"
+ROOT = 0
 
 
 class MeanPose(Anchor):
@@ -44,7 +47,18 @@ class MeanPose(Anchor):
             self.reference, self.height_statures = stored["reference"], float(stored["height"])
 
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
-        source = content.clip
+        return self._held(content.clip)
+
+    def sample(self, content: Take, style_label: str, *, rng: np.random.Generator) -> Clip:
+        return self._held(content.clip)
+
+    def predict(self, past: Clip, style: Take, trajectory_xz_m: FloatArray) -> Clip:
+        pose = self._held(crop(past, past.n_frames - 1, 1))
+        root = pose.root_xyz_m.copy()
+        root[0, [0, 2]] = trajectory_xz_m[0]
+        return pose.with_motion(pose.rotations_wxyz, root)
+
+    def _held(self, source: Clip) -> Clip:
         _, yaw = heading_removed(source)
         root = np.repeat(source.root_xyz_m[:1], source.n_frames, axis=0)
         root[:, 1] = self.height_statures * source.skeleton.stature_m
@@ -88,11 +102,43 @@ class StyleMeanShift(Anchor):
             self.styles = [str(style) for style in stored["styles"]]
 
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
-        source, start, end = content.clip, self._index(content.style), self._index(style.style)
+        return self._shifted(content, [(style.style, 1.0)], PARTS["all"])
+
+    def sample(self, content: Take, style_label: str, *, rng: np.random.Generator) -> Clip:
+        return self._shifted(content, [(style_label, 1.0)], PARTS["all"])
+
+    def interpolate(self, content: Take, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator) -> Clip:
+        return self.interpolate_parts(content, "all", styles, rng=rng)
+
+    def interpolate_parts(
+        self, content: Take, part: str, styles: Sequence[tuple[Take, float]], *, rng: np.random.Generator
+    ) -> Clip:
+        return self._shifted(content, [(style.style, weight) for style, weight in styles], PARTS[part])
+
+    def transfer_parts(self, content: Take, styles: Mapping[str, Take], *, rng: np.random.Generator) -> Clip:
+        clip = content.clip
+        for part, style in styles.items():
+            clip = self._shifted(content.with_clip(clip), [(style.style, 1.0)], PARTS[part])
+        return clip
+
+    def _shifted(self, content: Take, mixture: Sequence[tuple[str | None, float]], joints: Sequence[int]) -> Clip:
+        """The source with the joints moved from its own style's mean pose to a mixture of styles' mean poses.
+
+        A source whose style is unknown starts from the mean over all styles.
+        """
+        source = content.clip
+        known = content.style in self.styles
+        starts = [self._index(content.style)] if known else list(range(len(self.styles)))
+        start, start_height = self.vectors[starts].mean(axis=0), float(self.heights[starts].mean())
+        ends = [(self._index(style), weight) for style, weight in mixture]
+        shift = sum((weight * self.vectors[end] for end, weight in ends), -start)
         _, yaw = heading_removed(source)
-        vectors = local_rotation_vectors(source, self.reference) + (self.vectors[end] - self.vectors[start])
+        vectors = local_rotation_vectors(source, self.reference)
+        vectors[:, list(joints)] += shift[list(joints)]
         root = source.root_xyz_m.copy()
-        root[:, 1] += (self.heights[end] - self.heights[start]) * source.skeleton.stature_m
+        if ROOT in joints:
+            height = sum(weight * float(self.heights[end]) for end, weight in ends) - start_height
+            root[:, 1] += height * source.skeleton.stature_m
         return from_local_rotation_vectors(vectors, self.reference, yaw, root, source)
 
     def _index(self, style: str | None) -> int:
@@ -108,7 +154,7 @@ class NearestPose(Anchor):
     title = "retrieve nearest pose"
     description = "the fit window of the target style whose joint positions are nearest to the source's"
     draws_from = "fit"
-    traits = Traits(needs_style_label=True)
+    traits = Traits(needs_style_label=True, designed_input_frames=WINDOW_FRAMES, only_designed_input=True)
 
     def fit(self, takes: Sequence[Take], *, seed: int, budget: str, progress: ProgressCallback) -> None:
         self.bank = WindowBank.of(takes)
@@ -120,7 +166,10 @@ class NearestPose(Anchor):
         self.bank = WindowBank.load(folder)
 
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
-        rows = self.bank.rows(style=style.style)
+        return self.sample(content, str(style.style), rng=rng)
+
+    def sample(self, content: Take, style_label: str, *, rng: np.random.Generator) -> Clip:
+        rows = self.bank.rows(style=style_label)
         distances = np.linalg.norm(self.bank.descriptors[rows] - describe_window(content.clip), axis=1)
         return onto_skeleton(self.bank.clip(int(rows[np.argmin(distances)])), content.clip.skeleton)
 
@@ -136,7 +185,7 @@ class ClassifyAndRetrieve(Anchor):
     title = "classify and retrieve"
     description = "a random fit window of the predicted content and the target style"
     draws_from = "fit"
-    traits = Traits(needs_style_label=True)
+    traits = Traits(needs_style_label=True, designed_input_frames=WINDOW_FRAMES, only_designed_input=True)
 
     def fit(self, takes: Sequence[Take], *, seed: int, budget: str, progress: ProgressCallback) -> None:
         from sklearn.linear_model import LogisticRegression
@@ -173,9 +222,12 @@ class ClassifyAndRetrieve(Anchor):
         return self.contents[int(np.argmax(self.weights[:, :-1] @ features + self.weights[:, -1]))]
 
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
-        rows = self.bank.rows(content=self.predicted_content(content.clip), style=style.style)
+        return self.sample(content, str(style.style), rng=rng)
+
+    def sample(self, content: Take, style_label: str, *, rng: np.random.Generator) -> Clip:
+        rows = self.bank.rows(content=self.predicted_content(content.clip), style=style_label)
         if len(rows) == 0:
-            rows = self.bank.rows(style=style.style)
+            rows = self.bank.rows(style=style_label)
         return onto_skeleton(self.bank.clip(int(rng.choice(rows))), content.clip.skeleton)
 
     def _standardised(self, descriptors: FloatArray) -> FloatArray:

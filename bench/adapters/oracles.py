@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,19 +19,40 @@ TrueAnswer = Callable[[str, int, int, str], Clip]
 """``true_answer(content_take_id, start_frame, n_frames, target_style)``: known for procedural data only."""
 
 
+PerformedBy = Callable[[str, str, str], Clip]
+"""``performed_by(content_take_id, target_style, key)``: the take's task done by another actor; procedural data only."""
+
+WINDOW_TRACKS = ("transfer", "transfer/self", "transfer/foreign", "latent")
+
+
 @dataclass(frozen=True, eq=False)
 class World:
-    """What oracles see beyond their task."""
+    """What oracles see beyond their task.
+
+    Attributes
+    ----------
+    fit : what methods are trained on.
+    disjoint : takes that are neither sources nor in the Frechet reference, where the protocol has such.
+    takes : every take by its id, under native labels.
+    true_answer, performed_by : known for procedural data only.
+    """
 
     fit: Sequence[Take]
+    disjoint: Sequence[Take]
+    takes: Mapping[str, Take] = field(default_factory=dict)
     true_answer: TrueAnswer | None = None
+    performed_by: PerformedBy | None = None
 
 
 class Oracle(Anchor):
     """An anchor that answers with full knowledge.
 
-    The labels of the take that :meth:`answer` returns are those under which the row is scored.
+    The labels of the take that :meth:`answer` returns are those under which the row is scored. ``tracks`` names the
+    tracks and conditions (``transfer/self``; Park's tables count as their tracks) in which the answer means something.
     """
+
+    tracks: ClassVar[tuple[str, ...]] = WINDOW_TRACKS
+    needs_truth: ClassVar[bool] = False
 
     def answer(self, content: Take, start_frame: int, style: Take, world: World, *, rng: np.random.Generator) -> Take:
         """Answer one task: ``content`` is the source window with all labels, cut at ``start_frame`` of its take."""
@@ -54,11 +76,11 @@ class RealDisjoint(Oracle):
 
     name = "real-disjoint"
     title = "real motion (disjoint)"
-    description = "a random window of the fit part under its own content and style"
+    description = "a random window of real motion that is no source, under its own content and style"
     draws_from = "fit"
 
     def answer(self, content: Take, start_frame: int, style: Take, world: World, *, rng: np.random.Generator) -> Take:
-        return random_window(list(world.fit), content.clip.n_frames, rng)
+        return random_window(world.disjoint, content.clip.n_frames, rng)
 
 
 class LabelOracle(Oracle):
@@ -83,6 +105,8 @@ class ProceduralTruth(Oracle):
     title = "procedural truth"
     description = "the source's performance rendered in the target style by the generator"
     draws_from = "generator"
+    tracks = ("transfer", "transfer/self", "latent")
+    needs_truth = True
 
     def answer(self, content: Take, start_frame: int, style: Take, world: World, *, rng: np.random.Generator) -> Take:
         if world.true_answer is None:

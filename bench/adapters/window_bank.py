@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.adapters.piecewise import WINDOW_FPS
 from bench.arrays import FloatArray, IntArray
 from bench.datasets.take import Take
 from bench.motion.clip import Clip
-from bench.motion.edit import windows
+from bench.motion.edit import resample, windows
 from bench.motion.representation import window_frame
 from bench.motion.skeleton import canonical_skeleton
 
@@ -49,8 +50,12 @@ class WindowBank:
 
     @classmethod
     def of(cls, takes: Sequence[Take]) -> WindowBank:
-        """Cut labelled takes into windows of 64 frames every 8."""
-        pairs = [(take, part) for take in takes for _, part in windows(take.clip, WINDOW_FRAMES, STRIDE_FRAMES)]
+        """Cut labelled takes into windows of 64 frames at 30 fps every 8."""
+        pairs = [
+            (take, part)
+            for take in takes
+            for _, part in windows(resample(take.clip, WINDOW_FPS), WINDOW_FRAMES, STRIDE_FRAMES)
+        ]
         return cls(
             np.stack([part.rotations_wxyz for _, part in pairs]).astype(np.float32),
             np.stack([part.root_xyz_m for _, part in pairs]).astype(np.float32),
@@ -58,7 +63,7 @@ class WindowBank:
             np.stack([describe_window(part) for _, part in pairs]),
             tuple(str(take.content) for take, _ in pairs),
             tuple(str(take.style) for take, _ in pairs),
-            takes[0].clip.fps,
+            WINDOW_FPS,
         )
 
     def rows(self, *, content: str | None = None, style: str | None = None) -> IntArray:

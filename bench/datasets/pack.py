@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,6 +100,25 @@ class Pack:
             session=row["session"],
         )
 
+    @property
+    def by_id(self) -> Mapping[str, Take]:
+        """Takes by take id, each read when it is looked up."""
+        return _TakesById(self)
+
     def takes(self) -> tuple[Take, ...]:
         """All takes, in stored order."""
         return tuple(self.take(take_id) for take_id in self.rows)
+
+
+class _TakesById(Mapping[str, Take]):
+    def __init__(self, pack: Pack) -> None:
+        self.pack = pack
+
+    def __getitem__(self, take_id: str) -> Take:
+        return self.pack.take(take_id)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.pack.rows)
+
+    def __len__(self) -> int:
+        return len(self.pack.rows)

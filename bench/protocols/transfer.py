@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from bench.datasets.take import Take
 from bench.errors import BadData
-from bench.protocols.base import Protocol, Task
+from bench.motion.pose import random_start
+from bench.protocols.base import Protocol, Task, TaskPool, pick
 
 WINDOW_FRAMES = 64
 SAME_CONTENT_EVERY = 5
 """Every fifth sample has a style reference of the source's own content."""
 
 
-def make_tasks(test_takes: Sequence[Take], n: int, seed: int) -> list[Task]:
+def make_tasks(pool: TaskPool, n: int, seed: int) -> list[Task]:
     """The first ``n`` tasks of the fixed list; a longer list begins with the shorter one.
 
     Contents take turns, so that every content is source equally often; within a content the source take, the target
@@ -27,61 +28,66 @@ def make_tasks(test_takes: Sequence[Take], n: int, seed: int) -> list[Task]:
     ------
     BadData : no task can be made because there is one style or one content only.
     """
-    by_content: dict[str, list[Take]] = defaultdict(list)
-    for take in sorted(test_takes, key=lambda take: take.take_id):
-        by_content[str(take.content)].append(take)
-    contents = sorted(by_content)
-    styles = sorted({str(take.style) for take in test_takes})
-    if len(styles) < 2 or len(contents) < 2:
+    return draw_tasks(pool.takes, pool.takes, n, seed)
+
+
+def draw_tasks(sources: Sequence[Take], references: Sequence[Take], n: int, seed: int) -> list[Task]:
+    """:func:`make_tasks` with sources and style references from different takes."""
+    sources_by_content, references_by_content = _by_content(sources), _by_content(references)
+    contents, styles = sorted(sources_by_content), sorted({str(take.style) for take in references})
+    if len(styles) < 2 or len(references_by_content) < 2:
         raise BadData(
             f"style transfer needs at least 2 styles and 2 contents in the test part, got {len(styles)} and "
-            f"{len(contents)}"
+            f"{len(references_by_content)}"
         )
     rng = np.random.default_rng(seed)
     tasks: list[Task] = []
     for index in range(n):
         content = contents[index % len(contents)]
         same = (index // len(contents)) % SAME_CONTENT_EVERY == 0
-        tasks.append(_draw_task(f"s{index:04d}", content, same, by_content, styles, rng))
+        source = pick(sources_by_content[content], rng)
+        tasks.append(_draw_task(f"s{index:04d}", source, same, references_by_content, styles, rng))
     return tasks
+
+
+def _by_content(takes: Sequence[Take]) -> dict[str, list[Take]]:
+    by_content: dict[str, list[Take]] = defaultdict(list)
+    for take in sorted(takes, key=lambda take: take.take_id):
+        by_content[str(take.content)].append(take)
+    return by_content
 
 
 def _draw_task(
     sample_id: str,
-    content: str,
+    source: Take,
     same_content: bool,
-    by_content: dict[str, list[Take]],
+    by_content: Mapping[str, list[Take]],
     styles: list[str],
     rng: np.random.Generator,
 ) -> Task:
-    source = _pick(by_content[content], rng)
     targets = [style for style in styles if style != source.style]
     target = targets[int(rng.integers(len(targets)))]
     references = [
         take
         for name, takes in by_content.items()
-        if (name == content) == same_content
+        if (name == source.content) == same_content
         for take in takes
         if take.style == target
     ]
     if not references:
         references = [take for takes in by_content.values() for take in takes if take.style == target]
-    reference = _pick(references, rng)
+    reference = pick(references, rng)
     return Task(
         sample_id=sample_id,
         content_take_id=source.take_id,
-        start_frame=int(rng.integers(max(source.clip.n_frames - WINDOW_FRAMES, 0) + 1)),
+        start_frame=random_start(source.clip, WINDOW_FRAMES, rng),
         style_take_id=reference.take_id,
-        content=content,
+        content=str(source.content),
         source_style=str(source.style),
         target_style=target,
         reference_content=str(reference.content),
         seed=int(rng.integers(2**31)),
     )
-
-
-def _pick(takes: list[Take], rng: np.random.Generator) -> Take:
-    return takes[int(rng.integers(len(takes)))]
 
 
 TRANSFER = Protocol(
@@ -90,7 +96,6 @@ TRANSFER = Protocol(
     track="transfer",
     summary="content window + style reference -> motion; content and style must both be right on the same sample",
     needs="transfers",
-    window_frames=WINDOW_FRAMES,
     fps=30.0,
     n_samples={"smoke": 60, "quick": 1000, "standard": 2500},
     metrics=(
@@ -103,6 +108,8 @@ TRANSFER = Protocol(
         "cra_balanced",
         "sra",
         "sra_balanced",
+        "cra_top3",
+        "sra_top3",
         "source_style_residue",
         "fmd[stgcn-content]",
         "fmd[stgcn-style]",
@@ -114,6 +121,7 @@ TRANSFER = Protocol(
         "time_correlation",
         "bone_drift",
     ),
+    truth_metrics=("paired_position", "paired_rotation", "paired_position_aligned", "paired_rotation_aligned"),
     primary=("joint_recognition", "different_content"),
     make_tasks=make_tasks,
     facts={

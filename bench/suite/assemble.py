@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from bench.suite.plan import Cell
 from bench.suite.score import CellScores
-from bench.suite.scores.base import slices_of
 from bench.suite.setting import Setting
 from bench.suite.workers import Outcome
 from reports.records import (
@@ -52,6 +51,7 @@ def record_of(
         split=setting.split.kind,
         split_seed=setting.split.seed,
         track=setting.protocol.track,
+        condition=setting.protocol.condition,
         profile=setting.profile,
         seed=cell.seed,
         status=outcome.status,
@@ -69,7 +69,7 @@ def record_of(
 
 def record_key(setting: Setting, cell: Cell) -> str:
     """Key of a cell's record: what was generated, and by which protocol it is scored."""
-    return digest_of({"motions": cell.motions_key, "protocol": setting.protocol.protocol_id,
+    return digest_of({"motions": cell.motions_key, "protocol": setting.protocol.label,
                       "profile": setting.profile, "method": cell.facts.name, "seed": cell.seed})  # fmt: skip
 
 
@@ -77,28 +77,27 @@ def protocol_facts(setting: Setting) -> dict[str, str]:
     """What a reader needs beside the numbers to rebuild them."""
     return {
         **setting.protocol.facts,
-        "samples": str(len(setting.tasks)),
+        "tasks": str(len(setting.tasks)),
         "tasks digest": setting.tasks_digest,
         "split digest": setting.split.digest,
-        "fit part digest": setting.part_digest("fit"),
-        "real part digest": setting.part_digest("real"),
+        "fit digest": setting.fit_digest,
+        "real digest": setting.part_digest(*setting.protocol.real_parts),
         "licence": setting.dataset.licence,
         "citation": setting.dataset.citation,
     }
 
 
-def sample_arrays(setting: Setting, scores: CellScores) -> dict[str, NDArray[Any]]:
+def sample_arrays(scores: CellScores) -> dict[str, NDArray[Any]]:
     """The arrays of a samples file; see ``reports.records.read_samples`` for the names."""
-    tasks = setting.tasks
-    masks = slices_of(tasks, setting.dataset.content_labels, setting.dataset.style_labels)
     arrays: dict[str, NDArray[Any]] = {
-        "sample_id": np.array([task.sample_id for task in tasks]),
-        "cluster": np.array([task.content_take_id for task in tasks]),
+        "sample_id": np.array([task.sample_id for task in scores.samples]),
+        "cluster": np.array([task.content_take_id for task in scores.samples]),
     }
-    arrays |= {f"slice/{name}": mask for name, mask in masks.items()}
-    for seed in range(scores.embedding.n_seeds):
-        arrays[f"judge/stgcn-content/{seed}"] = scores.embedding.content_predicted[seed].astype(np.int8)
-        arrays[f"judge/stgcn-style/{seed}"] = scores.embedding.style_predicted[seed].astype(np.int8)
+    arrays |= {f"slice/{name}": mask for name, mask in scores.slices.items()}
+    if scores.embedding is not None:
+        for seed in range(scores.embedding.n_seeds):
+            arrays[f"judge/stgcn-content/{seed}"] = scores.embedding.content_predicted[seed].astype(np.int8)
+            arrays[f"judge/stgcn-style/{seed}"] = scores.embedding.style_predicted[seed].astype(np.int8)
     for scored in scores.scored.values():
         arrays |= {f"per_sample/{name}": values.astype(np.float32) for name, values in scored.per_sample.items()}
         arrays |= {f"replicates/{name}": values.astype(np.float32) for name, values in scored.replicates.items()}

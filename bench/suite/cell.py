@@ -18,18 +18,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bench.adapters.base import Adapter
 from bench.adapters.loading import AdapterSource, find_adapter
-from bench.adapters.oracles import Oracle, World
+from bench.adapters.oracles import World
 from bench.datasets.pack import Pack
 from bench.datasets.take import Take
 from bench.errors import BadMotion, BadOutput, BenchError
-from bench.motion.clip import Clip
-from bench.motion.edit import window
-from bench.protocols.base import Task
+from bench.suite.answering import answering
 from bench.suite.motions import Motions
+from bench.suite.setting import read_tasks
 from bench.suite.store import Store
 
 Send = Callable[[dict[str, Any]], None]
@@ -41,7 +38,8 @@ class GenerateJob:
 
     key: str
     tasks_file: str
-    window_frames: int
+    track: str
+    fps: float
 
 
 @dataclass(frozen=True)
@@ -53,6 +51,7 @@ class Job:
     pack: str
     store: str
     fit_take_ids: tuple[str, ...]
+    disjoint_take_ids: tuple[str, ...]
     fit_key: str
     budget: str
     seed: int
@@ -67,6 +66,7 @@ class Job:
                 **data,
                 "source": AdapterSource(**data["source"]),
                 "fit_take_ids": tuple(data["fit_take_ids"]),
+                "disjoint_take_ids": tuple(data["disjoint_take_ids"]),
                 "cells": tuple(GenerateJob(**cell) for cell in data["cells"]),
             }
         )
@@ -137,8 +137,8 @@ def _fit_view(take: Take) -> Take:
 
 
 def _generate(job: Job, cell: GenerateJob, adapter: Adapter, pack: Pack, send: Send) -> None:
-    tasks = [Task(**row) for row in json.loads(Path(cell.tasks_file).read_text())]
-    answer = _answering(job, adapter, pack, cell.window_frames)
+    tasks = read_tasks(Path(cell.tasks_file))
+    answer = answering(adapter, cell.track, cell.fps, pack, lambda: _world(job, pack))
 
     def write(folder: Path) -> dict[str, Any]:
         started, last_report = time.perf_counter(), 0.0
@@ -160,72 +160,13 @@ def _generate(job: Job, cell: GenerateJob, adapter: Adapter, pack: Pack, send: S
     Store(Path(job.store)).put("motions", cell.key, write)
 
 
-def _answering(job: Job, adapter: Adapter, pack: Pack, n_frames: int) -> Callable[[Task], Take]:
-    """A function from task to answer, with the labels under which the answer is scored."""
-    if isinstance(adapter, Oracle):
-        oracle = adapter
-        world = _world(job, pack)
-
-        def answer_oracle(task: Task) -> Take:
-            content, style = _take_pair(task, pack, n_frames)
-            rng = np.random.default_rng(task.seed)
-            take = oracle.answer(content, task.start_frame, style, world, rng=rng)
-            return take.with_clip(checked(take.clip, content.clip, task.sample_id, own_bones=True))
-
-        return answer_oracle
-
-    traits = adapter.traits
-
-    def answer(task: Task) -> Take:
-        content, style = _take_pair(task, pack, n_frames)
-        clip = adapter.transfer(
-            content.hidden(content=traits.needs_content_label, style=traits.needs_source_style_label),
-            style.hidden(content=False, style=traits.needs_style_label),
-            rng=np.random.default_rng(task.seed),
-        )
-        checked_clip = checked(clip, content.clip, task.sample_id, own_bones=False)
-        return Take(checked_clip, content=task.content, style=task.target_style)
-
-    return answer
-
-
-def _take_pair(task: Task, pack: Pack, n_frames: int) -> tuple[Take, Take]:
-    content = pack.take(task.content_take_id)
-    return content.with_clip(window(content.clip, task.start_frame, n_frames)), pack.take(task.style_take_id)
-
-
 def _world(job: Job, pack: Pack) -> World:
-    fit = [pack.take(take_id) for take_id in job.fit_take_ids]
+    fit, disjoint = ([pack.take(take_id) for take_id in ids] for ids in (job.fit_take_ids, job.disjoint_take_ids))
     if job.dataset != "procedural":
-        return World(fit)
-    from bench.datasets.procedural import true_answer
+        return World(fit, disjoint, pack.by_id)
+    from bench.datasets.procedural import imitated, true_answer
 
-    return World(fit, true_answer)
-
-
-def checked(clip: object, source: Clip, sample_id: str, *, own_bones: bool) -> Clip:
-    """An answer that may be scored: a Clip with the source's frames, fps and bones.
-
-    Raises
-    ------
-    BadOutput : naming the sample, what was expected and what came.
-    """
-    if not isinstance(clip, Clip):
-        raise BadOutput(f"expected a Clip, got {type(clip).__name__}", where=sample_id)
-    if clip.n_frames != source.n_frames:
-        raise BadOutput(f"expected {source.n_frames} frames, got {clip.n_frames}", where=sample_id)
-    if abs(clip.fps - source.fps) > 1e-6:
-        raise BadOutput(f"expected {source.fps} fps, got {clip.fps}", where=sample_id)
-    if not clip.skeleton.is_canonical:
-        raise BadOutput("expected the canonical 21 joints", where=sample_id)
-    if not own_bones and not clip.skeleton.same_bones(source.skeleton):
-        raise BadOutput(
-            "the output's bones differ from the content clip's",
-            where=sample_id,
-            cause="the style reference's skeleton was returned",
-            remedy="answer with content.clip.with_motion(...) or bench.motion.pose.onto_skeleton(...)",
-        )
-    return clip
+    return World(fit, disjoint, pack.by_id, true_answer, imitated)
 
 
 def _failure(key: str, error: Exception) -> dict[str, Any]:

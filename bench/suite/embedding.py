@@ -20,19 +20,29 @@ class Embedding:
     Attributes
     ----------
     content_features, style_features : ``[S, n, 64]``.
-    content_predicted, style_predicted : ``[S, n]`` class indices into the dataset's sorted judged labels.
+    content_log_probabilities, style_log_probabilities : ``[S, n, K]`` over the dataset's sorted judged labels.
     autoencoder_components : ``[S, n, 32]`` leading principal components of the auto-encoder features.
     """
 
     content_features: NDArray[np.float32]
     style_features: NDArray[np.float32]
-    content_predicted: NDArray[np.int16]
-    style_predicted: NDArray[np.int16]
+    content_log_probabilities: NDArray[np.float32]
+    style_log_probabilities: NDArray[np.float32]
     autoencoder_components: NDArray[np.float32]
 
     @property
     def n_seeds(self) -> int:
         return int(self.content_features.shape[0])
+
+    @property
+    def content_predicted(self) -> NDArray[np.int16]:
+        """``[S, n]`` index of the likeliest content."""
+        return np.asarray(self.content_log_probabilities.argmax(axis=-1), dtype=np.int16)
+
+    @property
+    def style_predicted(self) -> NDArray[np.int16]:
+        """``[S, n]`` index of the likeliest style."""
+        return np.asarray(self.style_log_probabilities.argmax(axis=-1), dtype=np.int16)
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Embedding:
         """The embedding of some of the windows."""

@@ -64,8 +64,8 @@ class JudgeOutputs:
         return Embedding(
             content_features=np.stack([out.features for out in self.content]).astype(np.float32),
             style_features=np.stack([out.features for out in self.style]).astype(np.float32),
-            content_predicted=np.stack([out.predicted for out in self.content]).astype(np.int16),
-            style_predicted=np.stack([out.predicted for out in self.style]).astype(np.int16),
+            content_log_probabilities=np.stack([out.log_probabilities for out in self.content]).astype(np.float32),
+            style_log_probabilities=np.stack([out.log_probabilities for out in self.style]).astype(np.float32),
             autoencoder_components=np.stack([out.components for out in self.encoded]).astype(np.float32),
         )
 

@@ -9,6 +9,7 @@ from bench.datasets.base import Dataset, ProgressCallback
 from bench.datasets.split import Split
 from bench.suite.embedding import Embedding
 from bench.suite.judges import PRETRAINED, JudgeSet, load_canonical, load_judges, save_judges, train_judges
+from bench.suite.keys import embed_key
 from bench.suite.motions import Motions
 from bench.suite.store import Store
 from reports.records import digest_of
@@ -54,3 +55,16 @@ def judges_for(
 def embed(judges: JudgeSet, motions: Motions) -> Embedding:
     """What all judges say about a set of motions; native-label judges only serve the judge card."""
     return replace(judges, native=()).evaluate(motions.window_features()).embedding
+
+
+def stored_embedding(judges: JudgeSet, motions: Motions, store: Store) -> Embedding:
+    """:func:`embed`, asked once for the same motions and judges."""
+    key = embed_key(motions.digest, judges.digest)
+    if not store.has("embed", key):
+
+        def write(folder: Path) -> dict[str, int]:
+            embed(judges, motions).save(folder)
+            return {"n": motions.n}
+
+        store.put("embed", key, write)
+    return Embedding.load(store.folder("embed", key))

@@ -75,9 +75,13 @@ def generate_key(fit: str, tasks: str, seed: int) -> str:
     return digest_of({"stage": "generate", "fit": fit, "tasks": tasks, "seed": seed})
 
 
+EMBEDDING_VERSION = 2
+"""Raised when more of what judges say is stored."""
+
+
 def embed_key(motions: str, judges: str) -> str:
     """Key of what the judges say about a set of motions."""
-    return digest_of({"stage": "embed", "motions": motions, "judges": judges})
+    return digest_of({"stage": "embed", "version": EMBEDDING_VERSION, "motions": motions, "judges": judges})
 
 
 def score_key(motions: str, reference: str, given: bool, metric: str, version: int) -> str:

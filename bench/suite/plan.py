@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bench.adapters.base import Adapter
 from bench.adapters.loading import AdapterSource, find_adapter
-from bench.adapters.oracles import Oracle, ProceduralTruth
+from bench.adapters.oracles import Oracle
 from bench.suite.keys import adapter_digest, fit_key, generate_key
 from bench.suite.setting import Setting
 from bench.suite.store import Store
@@ -16,6 +16,7 @@ from reports.records import MethodFacts
 SECONDS_PER_1000_SAMPLES = {"generate": 6.0, "score": 14.0}
 """Rough cost of a cell on one core, for ``--dry-run``; measured on the anchor rows."""
 BYTES_PER_FRAME = 21 * 16 + 12
+WHOLE_TAKE_FRAMES = 1600
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ def plan_cells(
 
 def _cell(setting: Setting, source: AdapterSource, adapter: type[Adapter], seed: int, budget: str, device: str) -> Cell:
     digest = adapter_digest(adapter)
-    fitted = fit_key(digest, setting.part_digest("fit"), budget, seed, device) if adapter.fits() else ""
+    fitted = fit_key(digest, setting.fit_digest, budget, seed, device) if adapter.fits() else ""
     return Cell(
         source=source,
         facts=_facts(source, adapter, digest, budget, seed),
@@ -77,10 +78,17 @@ def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: s
 
 
 def _unsupported(adapter: type[Adapter], setting: Setting) -> str:
-    if issubclass(adapter, ProceduralTruth) and setting.dataset.name != "procedural":
-        return "true answers exist for the procedural dataset only"
-    if setting.protocol.needs not in adapter.capabilities() and not issubclass(adapter, Oracle):
-        return f"the {setting.protocol.track} track needs an adapter that {setting.protocol.needs}"
+    protocol = setting.protocol
+    if issubclass(adapter, Oracle):
+        if adapter.needs_truth and setting.dataset.name != "procedural":
+            return "true answers exist for the procedural dataset only"
+        wanted = protocol.track
+        if protocol.condition in ("self", "long", "short", "foreign", "parts"):
+            wanted = f"{protocol.track}/{protocol.condition}"
+        if wanted not in adapter.tracks:
+            return f"means nothing in {protocol.label}"
+    elif protocol.needs not in adapter.capabilities():
+        return f"{protocol.label} needs an adapter that {protocol.needs}"
     return ""
 
 
@@ -100,5 +108,5 @@ def estimate(setting: Setting, cells: Sequence[Cell], store: Store, jobs: int) -
     waiting = [cell for cell in runnable if not store.has("motions", cell.motions_key)]
     per_cell = len(setting.tasks) / 1000.0
     seconds = per_cell * sum(SECONDS_PER_1000_SAMPLES.values()) * len(waiting)
-    size = len(waiting) * len(setting.tasks) * setting.protocol.window_frames * BYTES_PER_FRAME
+    size = len(waiting) * sum(task.n_frames or WHOLE_TAKE_FRAMES for task in setting.tasks) * BYTES_PER_FRAME
     return Estimate(len(cells), len(waiting), seconds / max(jobs, 1) / 60.0, size / 2**20)

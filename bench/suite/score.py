@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
@@ -14,17 +13,22 @@ from threadpoolctl import threadpool_limits
 
 from bench.arrays import FloatArray
 from bench.datasets.pack import Pack
-from bench.motion.edit import window
-from bench.protocols.base import Task
+from bench.protocols import PROTOCOLS
+from bench.protocols.base import Protocol, Task, stable_seed
+from bench.suite.answering import source_of
 from bench.suite.embedding import Embedding
 from bench.suite.judges import JudgeSet, load_judges
-from bench.suite.judging import embed
-from bench.suite.keys import embed_key, score_key
+from bench.suite.judging import stored_embedding
+from bench.suite.keys import score_key
 from bench.suite.motions import Motions
-from bench.suite.reference import label_indices, load_reference
+from bench.suite.reference import label_indices, load_reference, trials_of
+from bench.suite.samples import cut_motions, samples_of
 from bench.suite.scores import SCORES
-from bench.suite.scores.base import Reference, Row, Scored
+from bench.suite.scores.base import Basis, PlainRow, Reference, Row, Scored
+from bench.suite.scores.conditions import SegmentRow
+from bench.suite.setting import read_tasks
 from bench.suite.store import Store
+from reports.bootstrap import cluster_counts
 from reports.records import Measurement
 
 ARRAYS_FILE = "arrays.npz"
@@ -37,24 +41,30 @@ class ScoreSpec:
     store: str
     pack: str
     tasks_file: str
-    tasks_digest: str
     judges_folder: str
+    """empty where no judge takes part"""
     judges_digest: str
     reference_key: str
-    protocol_id: str
-    window_frames: int
+    truth_key: str
+    """empty where the true answers are not known or not asked for"""
+    protocol: str
+    """label in PROTOCOLS"""
+    profile: str
     metrics: tuple[tuple[str, int], ...]
     """names with versions"""
     content_labels: tuple[str, ...]
     style_labels: tuple[str, ...]
+    fit_take_ids: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class CellScores:
-    """All metrics of a cell, as stored."""
+    """All metrics of a cell, as stored. ``embedding`` is None where no judge takes part."""
 
     motions_digest: str
-    embedding: Embedding
+    samples: tuple[Task, ...]
+    slices: dict[str, Any]
+    embedding: Embedding | None
     scored: dict[str, Scored]
 
 
@@ -64,30 +74,53 @@ class Scorer:
     def __init__(self, spec: ScoreSpec) -> None:
         self.spec = spec
         self.store = Store(Path(spec.store))
-        self.tasks = tuple(Task(**row) for row in json.loads(Path(spec.tasks_file).read_text()))
+        self.tasks = read_tasks(Path(spec.tasks_file))
+
+    @cached_property
+    def protocol(self) -> Protocol:
+        return PROTOCOLS[self.spec.protocol]
 
     @cached_property
     def judges(self) -> JudgeSet:
         return load_judges(Path(self.spec.judges_folder))
 
     @cached_property
-    def reference(self) -> Reference:
-        folder = self.store.folder("reference", self.spec.reference_key)
-        return load_reference(
-            folder,
-            self.store.facts("reference", self.spec.reference_key),
-            tasks=self.tasks,
+    def pack(self) -> Pack:
+        return Pack.open(Path(self.spec.pack))
+
+    @cached_property
+    def samples(self) -> tuple[Task, ...]:
+        """What is scored: the tasks, or what the track makes of them."""
+        return samples_of(self.protocol, self.tasks, self.pack)
+
+    @cached_property
+    def basis(self) -> Basis:
+        """What all rows share, without judges."""
+        clusters = np.array([task.content_take_id for task in self.samples])
+        return Basis(
+            tasks=self.samples,
             content_labels=self.spec.content_labels,
             style_labels=self.spec.style_labels,
-            protocol_id=self.spec.protocol_id,
+            counts=cluster_counts(clusters, seed=stable_seed("bootstrap", self.protocol.label)),
+            pack=self.pack,
+            fit_take_ids=self.spec.fit_take_ids,
+            truth=Motions.load(self.store.folder("truth", self.spec.truth_key)) if self.spec.truth_key else None,
+            trials=trials_of(self.protocol, self.spec.profile, clusters),
         )
 
     @cached_property
+    def reference(self) -> Basis | Reference:
+        """What rows are scored against."""
+        if not self.spec.judges_folder:
+            return self.basis
+        key = self.spec.reference_key
+        folder = self.store.folder("reference", key)
+        return load_reference(folder, self.store.facts("reference", key), self.basis, self.judges)
+
+    @cached_property
     def source(self) -> Motions:
-        """The source windows of all tasks."""
-        pack = Pack.open(Path(self.spec.pack))
-        takes = [(pack.take(task.content_take_id), task.start_frame) for task in self.tasks]
-        return Motions.of([take.with_clip(window(take.clip, start, self.spec.window_frames)) for take, start in takes])
+        """The contents of all tasks."""
+        return Motions.of([source_of(task, self.pack, self.protocol.fps) for task in self.tasks])
 
     def keys(self, motions_digest: str, given: bool) -> dict[str, str]:
         """Metric name -> score key."""
@@ -105,7 +138,7 @@ class Scorer:
         digest = str(self.store.facts("motions", motions_key)["motions_digest"])
         missing = self.missing(digest, given)
         if missing:
-            row = self._row(motions_key, digest, given)
+            row = self._row(Motions.load(self.store.folder("motions", motions_key)), given)
             keys = self.keys(digest, given)
             for name in missing:
                 scored = SCORES[name](row, self.reference)
@@ -116,23 +149,32 @@ class Scorer:
         """All stored metrics of a cell."""
         digest = str(self.store.facts("motions", motions_key)["motions_digest"])
         scored = {name: self._read(key) for name, key in self.keys(digest, given).items()}
-        embedding = Embedding.load(self.store.folder("embed", embed_key(digest, self.spec.judges_digest)))
-        return CellScores(digest, embedding, scored)
+        embedding = None
+        if self.spec.judges_folder:
+            motions = Motions.load(self.store.folder("motions", motions_key))
+            embedding = self._judged(cut_motions(motions, self.tasks, self.samples))
+        return CellScores(digest, self.samples, dict(self.basis.slices), embedding, scored)
 
-    def _row(self, motions_key: str, digest: str, given: bool) -> Row:
-        motions = Motions.load(self.store.folder("motions", motions_key))
-        key = embed_key(digest, self.spec.judges_digest)
-        if not self.store.has("embed", key):
-            self.store.put("embed", key, lambda folder: _write_embedding(folder, embed(self.judges, motions)))
-        return Row(
+    def _row(self, uncut: Motions, given: bool) -> PlainRow:
+        motions = cut_motions(uncut, self.tasks, self.samples)
+        source = cut_motions(self.source, self.tasks, self.samples)
+        if not self.spec.judges_folder:
+            return PlainRow(motions, source)
+        judged = Row(
             motions=motions,
-            embedding=Embedding.load(self.store.folder("embed", key)),
-            source=self.source,
+            source=source,
+            embedding=self._judged(motions),
             contents=label_indices(motions.contents, self.spec.content_labels),
             styles=label_indices(motions.styles, self.spec.style_labels),
-            source_styles=label_indices([task.source_style for task in self.tasks], self.spec.style_labels),
+            source_styles=label_indices([task.source_style for task in self.samples], self.spec.style_labels),
             given=given,
         )
+        if motions is uncut:
+            return judged
+        return SegmentRow(**vars(judged), uncut=uncut, uncut_source=self.source, sequences=self.tasks)
+
+    def _judged(self, motions: Motions) -> Embedding:
+        return stored_embedding(self.judges, motions, self.store)
 
     def _read(self, key: str) -> Scored:
         folder = self.store.folder("score", key)
@@ -155,11 +197,6 @@ def _write_scored(scored: Scored, folder: Path) -> dict[str, Any]:
     arrays |= {f"replicates/{name}": values for name, values in scored.replicates.items()}
     np.savez(folder / ARRAYS_FILE, **arrays)  # type: ignore[arg-type]
     return {"measurements": [measurement.model_dump(mode="json") for measurement in scored.measurements]}
-
-
-def _write_embedding(folder: Path, embedding: Embedding) -> dict[str, Any]:
-    embedding.save(folder)
-    return {"n": int(embedding.content_features.shape[1])}
 
 
 @cache

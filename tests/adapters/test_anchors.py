@@ -6,16 +6,28 @@ import numpy as np
 import pytest
 
 from bench.adapters import ADAPTERS
-from bench.adapters.anchors import CopyContent, CopyStyle, FrozenFrame, NoiseHigh, NoiseLow, NoiseMiddle, PoseAdain
+from bench.adapters.anchors import (
+    CopyContent,
+    CopyStyle,
+    FrozenFrame,
+    LinearBlend,
+    NoiseHigh,
+    NoiseLow,
+    NoiseMiddle,
+    PoseAdain,
+    Splice,
+)
 from bench.adapters.base import Adapter
 from bench.adapters.fitted_anchors import ClassifyAndRetrieve, MeanPose, NearestPose, StyleMeanShift
 from bench.adapters.oracles import LabelOracle, Oracle, RealDisjoint, RealTest, World
+from bench.adapters.piecewise import in_windows
 from bench.datasets.take import Take
 from bench.errors import BadConfig, BadData
 from bench.motion import quat
 from bench.motion.clip import Clip
-from bench.motion.edit import window
+from bench.motion.edit import crop, window
 from bench.motion.kinematics import world_positions
+from bench.motion.skeleton import PARTS
 from tests.motion.factory import person, random_clip
 
 STYLES, CONTENTS = ("angry", "old"), ("run", "walk")
@@ -55,6 +67,19 @@ def fitted(adapter: Adapter) -> Adapter:
 NORMAL = [adapter for adapter in ADAPTERS.values() if not issubclass(adapter, Oracle)]
 
 
+def answers(adapter: Adapter, source: Take, style: Take) -> dict[str, Clip]:
+    """What an adapter answers to each capability it has, with half of the style where a share is asked for."""
+    half = [(Take(source.clip, style=source.style), 0.5), (style, 0.5)]
+    calls = {
+        "transfers": lambda: adapter.transfer(source, style, rng=rng()),
+        "samples": lambda: adapter.sample(source, str(style.style), rng=rng()),
+        "interpolates": lambda: adapter.interpolate(source, half, rng=rng()),
+        "interpolates parts": lambda: adapter.interpolate_parts(source, "arms", half, rng=rng()),
+        "transfers parts": lambda: adapter.transfer_parts(source, {"legs": style}, rng=rng()),
+    }
+    return {name: call() for name, call in calls.items() if name in adapter.capabilities()}
+
+
 @pytest.mark.parametrize("adapter_class", NORMAL, ids=lambda a: a.name)
 def test_every_anchor_answers_on_the_sources_bones(adapter_class: type[Adapter], tmp_path: Path) -> None:
     source, style = source_and_style()
@@ -64,11 +89,49 @@ def test_every_anchor_answers_on_the_sources_bones(adapter_class: type[Adapter],
         fitted(adapter).save(tmp_path)
         adapter = adapter_class()
         adapter.load(tmp_path)
-    out = adapter.transfer(source, big_style, rng=rng())
-    assert (out.n_frames, out.fps) == (64, 30.0)
-    assert out.skeleton.same_bones(source.clip.skeleton)
-    again = adapter.transfer(source, big_style, rng=rng())
-    np.testing.assert_array_equal(out.rotations_wxyz, again.rotations_wxyz)
+    first, second = (answers(adapter, source, big_style) for _ in range(2))
+    assert first or "predicts" in adapter.capabilities()
+    for name, out in first.items():
+        assert (out.n_frames, out.fps) == (64, 30.0)
+        assert out.skeleton.same_bones(source.clip.skeleton)
+        np.testing.assert_array_equal(out.rotations_wxyz, second[name].rotations_wxyz)
+
+
+@pytest.mark.parametrize("adapter_class", [a for a in NORMAL if "predicts" in a.capabilities()], ids=lambda a: a.name)
+def test_predictions_are_one_frame(adapter_class: type[Adapter]) -> None:
+    source, style = source_and_style()
+    adapter = adapter_class()
+    if adapter.fits():
+        fitted(adapter)
+    out = adapter.predict(crop(source.clip, 0, 30), style, np.zeros((30, 2)))
+    assert (out.n_frames, out.fps) == (1, 30.0)
+
+
+def test_splice_changes_the_part_and_nothing_else() -> None:
+    source, style = source_and_style()
+    for part in ("legs", "arms", "spine"):
+        out = Splice().transfer_parts(source, {part: style}, rng=rng())
+        angle = quat.angle_between(out.rotations_wxyz, source.clip.rotations_wxyz).mean(axis=0)
+        inside = list(PARTS[part])
+        assert angle[inside].mean() > 0.01
+        assert np.delete(angle, inside).max() < 1e-9
+
+
+def test_linear_blend_goes_from_end_to_end() -> None:
+    source, style = source_and_style()
+    own = Take(source.clip, style=source.style)
+    clips = [LinearBlend().interpolate(source, [(own, 1.0 - w), (style, w)], rng=rng()) for w in (0.0, 0.5, 1.0)]
+    np.testing.assert_allclose(quat.angle_between(clips[0].rotations_wxyz, source.clip.rotations_wxyz), 0.0, atol=1e-6)
+    half, whole = (quat.angle_between(clips[0].rotations_wxyz, clip.rotations_wxyz) for clip in clips[1:])
+    np.testing.assert_allclose(half, whole / 2.0, atol=1e-6)
+
+
+def test_a_window_method_answers_a_long_content_in_pieces() -> None:
+    long = random_clip(400, seed=3)
+    out = in_windows(Clip(long.skeleton, long.rotations_wxyz, long.root_xyz_m, 60.0), 64, lambda clip: clip)
+    assert (out.n_frames, out.fps) == (400, 60.0)
+    inside = quat.angle_between(out.rotations_wxyz[40:120], long.rotations_wxyz[40:120])
+    assert np.median(inside) < 0.05
 
 
 def test_copies_copy() -> None:
@@ -136,7 +199,7 @@ def test_classifier_knows_its_training_takes() -> None:
 
 def test_oracles_answer_under_the_right_labels() -> None:
     source, style = source_and_style()
-    world = World(toy_takes())
+    world = World(toy_takes(), toy_takes())
     assert RealTest().answer(source, 5, style, world, rng=rng()) is source
     right = LabelOracle().answer(source, 5, style, world, rng=rng())
     assert (right.content, right.style, right.clip.n_frames) == (source.content, style.style, 64)
@@ -147,4 +210,4 @@ def test_oracles_answer_under_the_right_labels() -> None:
 def test_undeclared_capability_is_refused_with_a_remedy() -> None:
     source, _ = source_and_style()
     with pytest.raises(BadConfig, match=r"does not declare that it samples.*override sample\(\)"):
-        CopyContent().sample(source, "old", rng=rng())
+        CopyStyle().sample(source, "old", rng=rng())

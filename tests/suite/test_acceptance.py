@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from bench.suite.run import RunRequest, run
+from bench.suite.request import RunRequest
+from bench.suite.run import run
 from reports.records import Record
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from bench.errors import BadConfig, BadData, BadFile
-from bench.suite.run import RunRequest, protocols_of, run, sources_of
+from bench.suite.request import RunRequest, protocols_of, sources_of
+from bench.suite.run import run
 
 SILENT = lambda *_: None  # noqa: E731
 
@@ -20,7 +21,8 @@ def request(folder: Path, **changes: object) -> RunRequest:
     ("changes", "error", "message"),
     [
         ({"methods": ("nope",)}, BadConfig, "unknown method 'nope'"),
-        ({"tracks": ("nope",)}, BadConfig, "unknown track nope"),
+        ({"tracks": ("nope",)}, BadConfig, "unknown track 'nope'"),
+        ({"protocols": ("park2021@9",)}, BadConfig, "unknown protocol 'park2021@9'"),
         ({"profile": "nope"}, BadConfig, "unknown profile 'nope'"),
         ({"data": {"nope": None}}, BadConfig, "unknown dataset 'nope'"),
         ({"data": {"bandai-namco": None}}, BadConfig, "read from your disk"),

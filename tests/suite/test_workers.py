@@ -10,6 +10,7 @@ import pytest
 from bench.adapters.loading import AdapterSource
 from bench.datasets.pack import write_pack
 from bench.datasets.take import Take
+from bench.protocols.base import TaskPool
 from bench.protocols.transfer import make_tasks
 from bench.suite.cell import GenerateJob, Job
 from bench.suite.motions import Motions
@@ -43,10 +44,10 @@ def make_job(folder: Path, body: str) -> Job:
     (folder / "pack").mkdir()
     write_pack(folder / "pack", takes)
     tasks = folder / "tasks.json"
-    tasks.write_text(json.dumps([task.as_dict() for task in make_tasks(takes, 6, 0)]))
+    tasks.write_text(json.dumps([task.as_dict() for task in make_tasks(TaskPool(takes), 6, 0)]))
     return Job(
-        AdapterSource("mine", str(folder / "mine.py")), "toy", str(folder / "pack"), str(folder / "store"), (), "",
-        "smoke", 0, (GenerateJob("cell", str(tasks), 64),),
+        AdapterSource("mine", str(folder / "mine.py")), "toy", str(folder / "pack"), str(folder / "store"), (), (), "",
+        "smoke", 0, (GenerateJob("cell", str(tasks), "transfer", 30.0),),
     )  # fmt: skip
 
 

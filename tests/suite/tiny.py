@@ -21,7 +21,8 @@ from bench.protocols import PROTOCOLS
 from bench.suite import judging
 from bench.suite.judge_training import JudgeRecipe
 from bench.suite.judges import train_judges
-from bench.suite.run import RunRequest, RunResult, run
+from bench.suite.request import RunRequest
+from bench.suite.run import RunResult, run
 from classifiers.train import TrainingConfig
 from tests.motion.factory import random_clip
 

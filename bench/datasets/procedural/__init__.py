@@ -6,6 +6,6 @@ style), ``styles``, ``actors``, then the actions themselves in ``locomotion``, `
 
 from __future__ import annotations
 
-from bench.datasets.procedural.dataset import ENTRY, load, performed_by, true_answer, unseen_takes
+from bench.datasets.procedural.dataset import ENTRY, imitated, load, performed_by, true_answer, unseen_takes
 
-__all__ = ["ENTRY", "load", "performed_by", "true_answer", "unseen_takes"]
+__all__ = ["ENTRY", "imitated", "load", "performed_by", "true_answer", "unseen_takes"]

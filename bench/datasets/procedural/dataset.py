@@ -94,6 +94,16 @@ def performed_by(take_id: str, style: str, actor: Actor, key: str = "0") -> Clip
     return render(imitation(performance_of(take_id), actor, key), _known_style(style))
 
 
+def imitated(take_id: str, style: str, key: str) -> Clip:
+    """The take's task performed in a style by one more actor, whom no take shows; ``key`` names the actor.
+
+    Raises
+    ------
+    BadInput : no such take or style.
+    """
+    return performed_by(take_id, style, make_actor(f"imitator-{key}"), key)
+
+
 def unseen_takes(seed: int = 0, takes_per_cell: int = 6) -> tuple[Take, ...]:
     """Takes of every cell by actors that the dataset does not have, for measuring judges."""
     takes = []

@@ -1,17 +1,18 @@
-"""How the transfer track computes each of its metrics. SCORES is the table of all.
+"""How each track computes each of its metrics. SCORES is the table of all.
 
-Each metric is one function of a row and the shared reference, so that each can be computed, stored and recomputed
-alone.
+Each metric is one function of a row and what the row is scored against, so that each can be computed, stored and
+recomputed alone. Judged tracks get a ``Row`` and a ``Reference``, the others a ``PlainRow`` and a ``Basis``.
 """
 
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
-from bench.suite.scores import distances, motion, recognition
-from bench.suite.scores.base import Score
+from bench.suite.scores import conditions, distances, interpolation, motion, papers, parts, prediction, recognition
+from bench.suite.scores.base import AnyScore
 
-SCORES: dict[str, Score] = {
+SCORES: dict[str, AnyScore[Any, Any]] = {
     "joint_recognition": recognition.joint_recognition,
     "joint_recognition_ratio": recognition.joint_recognition_ratio,
     "conditional_kid": distances.conditional_kid,
@@ -19,13 +20,34 @@ SCORES: dict[str, Score] = {
     "copied_share": motion.copied_share,
     "cra": recognition.cra,
     "cra_balanced": recognition.cra_balanced,
+    "cra_top3": papers.cra_top3,
     "sra": recognition.sra,
     "sra_balanced": recognition.sra_balanced,
+    "sra_top3": papers.sra_top3,
     "source_style_residue": recognition.source_style_residue,
     "jerk_ratio": motion.jerk_ratio,
     "jerk_ratio_worst_content": motion.jerk_ratio_worst_content,
     "time_correlation": motion.time_correlation,
     "bone_drift": motion.bone_drift,
     **{name: partial(distances.set_distance, name, features) for name, features in distances.SET_FEATURES.items()},
+    **{name: partial(conditions.paired_truth, name) for name in conditions.PAIRED_ERRORS},
+    "reconstruction_position": conditions.reconstruction_position,
+    "reconstruction_rotation": conditions.reconstruction_rotation,
+    "join_jerk_ratio": conditions.join_jerk_ratio,
+    "prefix_error": conditions.prefix_error,
+    "fmd[stgcn]": papers.fmd_stgcn,
+    **{name: partial(papers.fmd_dae_512, name) for name in papers.CUT_OF},
+    "leak_ratio": parts.rotation_leak,
+    "leak_ratio[position]": parts.position_leak,
+    "locality_msd": parts.mean_squared_displacement,
+    "locality_distance": parts.mean_displacement,
+    "joints_above_0.1": partial(parts.joints_above, "joints_above_0.1", 0.1),
+    "joints_above_0.05": partial(parts.joints_above, "joints_above_0.05", 0.05),
+    "monotonicity": interpolation.monotonicity,
+    "evenness": interpolation.evenness,
+    "end_recognition": interpolation.end_recognition,
+    "middle_content": interpolation.middle_content,
+    "next_frame_error": prediction.next_frame_error,
+    "bone_length_loss": prediction.bone_length_loss,
 }
-"""Metric name -> how the transfer track computes it."""
+"""Metric name -> how it is computed. The runtime track scores durations instead, see ``scores.runtime``."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -130,18 +132,21 @@ SET_FEATURES = {
 """Set distance -> the features it is taken on, as a field of ``Embedding``."""
 
 
-def floors(reference: Reference) -> dict[str, float]:
-    """Every distance between real motion of the fit part and the real part, at the tasks' n, mean over judge seeds."""
+def floors(reference: Reference, names: Sequence[str]) -> dict[str, float]:
+    """Distances among ``names`` between other real motion and the real part, at the tasks' n, mean over judge seeds."""
     found = {}
-    for name, features in SET_FEATURES.items():
-        exact = _frechet if name.startswith("fmd") else kernel.kernel_distance
-        real, floor = (
-            getattr(side.embedding, features).astype(np.float64) for side in (reference.real, reference.floor)
-        )
-        found[name] = float(np.mean([exact(a, b) for a, b in zip(real, floor, strict=True)]))
-    for name, form in (("conditional_kid", _Kid()), ("conditional_fmd", _Fmd(reference))):
-        style, content = (_sides(kind, reference.floor, reference, form, None, None)[0] for kind in SIDES)
-        found[name] = float(np.maximum(style, content).mean())
+    for name in names:
+        if name in SET_FEATURES or name == "fmd[stgcn]":
+            features = SET_FEATURES.get(name, "content_features")
+            exact = _frechet if name.startswith("fmd") else kernel.kernel_distance
+            real, floor = (
+                getattr(side.embedding, features).astype(np.float64) for side in (reference.real, reference.floor)
+            )
+            found[name] = float(np.mean([exact(a, b) for a, b in zip(real, floor, strict=True)]))
+        elif name in ("conditional_kid", "conditional_fmd"):
+            form = _Kid() if name == "conditional_kid" else _Fmd(reference)
+            style, content = (_sides(kind, reference.floor, reference, form, None, None)[0] for kind in SIDES)
+            found[name] = float(np.maximum(style, content).mean())
     return found
 
 

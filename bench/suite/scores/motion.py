@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bench.errors import BadInput
 from bench.metrics import memorisation, physics
 from bench.motion.skeleton import CANONICAL_PARENTS
 from bench.suite.scores.base import PRIMARY_SLICE, Reference, Row, Scored, measure, share_score
@@ -11,7 +12,14 @@ from reports.bootstrap import mean_replicates
 
 
 def copied_share(row: Row, reference: Reference) -> Scored:
-    """Outputs nearer to the fit part, their source or their style reference than the copy threshold."""
+    """Outputs nearer to the fit part, their source or their style reference than the copy threshold.
+
+    Raises
+    ------
+    BadInput : the reference was built without the motion that methods were given.
+    """
+    if reference.fit_bank is None or reference.test_bank is None:
+        raise BadInput("a search for copies needs the motion that methods were given", where="reference")
     queries = memorisation.pose_descriptors(row.motions.window_positions)
     distances = reference.fit_bank.nearest(queries)
     if row.given:

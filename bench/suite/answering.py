@@ -1,0 +1,161 @@
+"""How a worker has one task answered, by track: what the adapter is given, and what its answer is checked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.adapters.base import Adapter
+from bench.adapters.oracles import Oracle, World
+from bench.adapters.piecewise import in_windows
+from bench.datasets.pack import Pack
+from bench.datasets.take import Take
+from bench.errors import BadOutput
+from bench.motion.clip import Clip
+from bench.motion.edit import crop, resample, window
+from bench.protocols.base import Task
+from bench.protocols.prediction import PAST_FRAMES
+
+Answer = Callable[[Task], Take]
+"""From a task to the answer, with the labels under which it is scored."""
+
+
+def answering(adapter: Adapter, track: str, fps: float, pack: Pack, world: Callable[[], World]) -> Answer:
+    """The function that has ``adapter`` answer the tasks of a track whose contents come at ``fps``."""
+    if isinstance(adapter, Oracle):
+        return _OracleAnswers(adapter, fps, pack, world())
+    return ANSWERS[track](adapter, fps, pack)
+
+
+@dataclass(frozen=True)
+class _OracleAnswers:
+    oracle: Oracle
+    fps: float
+    pack: Pack
+    world: World
+
+    def __call__(self, task: Task) -> Take:
+        content = source_of(task, self.pack, self.fps)
+        style = self.pack.take(task.style_take_id)
+        take = self.oracle.answer(content, task.start_frame, style, self.world, rng=np.random.default_rng(task.seed))
+        same_length = task.n_frames > 0
+        return take.with_clip(checked(take.clip, content.clip, task.sample_id, own_bones=True, same_length=same_length))
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """An adapter with the labels it declared to need, and nothing else."""
+
+    adapter: Adapter
+    fps: float
+    pack: Pack
+
+    def __call__(self, task: Task) -> Take:
+        content = source_of(task, self.pack, self.fps)
+        clip = self._answer(task, self._hidden_content(content))
+        return Take(checked(clip, content.clip, task.sample_id), content=task.content, style=task.target_style)
+
+    def _answer(self, task: Task, content: Take) -> Clip:
+        traits = self.adapter.traits
+        n_frames = traits.designed_input_frames
+        if not (traits.only_designed_input and n_frames) or content.clip.n_frames == n_frames:
+            return self._call(task, content)
+        return in_windows(content.clip, n_frames, lambda clip: self._call(task, content.with_clip(clip)))
+
+    def _call(self, task: Task, content: Take) -> Clip:
+        raise NotImplementedError
+
+    def _hidden_content(self, take: Take) -> Take:
+        traits = self.adapter.traits
+        return take.hidden(content=traits.needs_content_label, style=traits.needs_source_style_label)
+
+    def _hidden_style(self, take_id: str) -> Take:
+        return self.pack.take(take_id).hidden(content=False, style=self.adapter.traits.needs_style_label)
+
+
+class _Transfer(_Answers):
+    def _call(self, task: Task, content: Take) -> Clip:
+        return self.adapter.transfer(content, self._hidden_style(task.style_take_id), rng=_rng(task))
+
+
+class _Sample(_Answers):
+    def _call(self, task: Task, content: Take) -> Clip:
+        return self.adapter.sample(content, task.target_style, rng=_rng(task))
+
+
+class _Parts(_Answers):
+    def _call(self, task: Task, content: Take) -> Clip:
+        styles = {task.part: self._hidden_style(task.style_take_id)}
+        return self.adapter.transfer_parts(content, styles, rng=_rng(task))
+
+
+class _Interpolate(_Answers):
+    def _call(self, task: Task, content: Take) -> Clip:
+        named = task.source_style if self.adapter.traits.needs_style_label else None
+        start = self._hidden_style(task.start_take_id) if task.start_take_id else Take(content.clip, style=named)
+        styles = [(start, 1.0 - task.weight), (self._hidden_style(task.style_take_id), task.weight)]
+        if task.part:
+            return self.adapter.interpolate_parts(content, task.part, styles, rng=_rng(task))
+        return self.adapter.interpolate(content, styles, rng=_rng(task))
+
+
+class _Predict(_Answers):
+    """Single frames from the true past; the answer's bones are its own."""
+
+    def __call__(self, task: Task) -> Take:
+        take = self.pack.take(task.content_take_id)
+        past = crop(take.clip, task.start_frame - PAST_FRAMES, PAST_FRAMES)
+        path = take.clip.root_xyz_m[task.start_frame : task.start_frame + PAST_FRAMES, [0, 2]]
+        clip = self.adapter.predict(past, self._hidden_style(task.style_take_id), path)
+        frame = crop(take.clip, task.start_frame, 1)
+        return Take(checked(clip, frame, task.sample_id, own_bones=True), content=task.content, style=task.target_style)
+
+
+ANSWERS: dict[str, type[_Answers]] = {
+    "transfer": _Transfer,
+    "latent": _Sample,
+    "parts": _Parts,
+    "interpolation": _Interpolate,
+    "gesture": _Transfer,
+    "prediction": _Predict,
+}
+"""Track -> how its tasks are answered. The runtime track generates nothing."""
+
+
+def source_of(task: Task, pack: Pack, fps: float) -> Take:
+    """The content of a task with all its labels: a window of its take, or the whole take, at ``fps``."""
+    take = pack.take(task.content_take_id)
+    if task.n_frames:
+        return take.with_clip(window(take.clip, task.start_frame, task.n_frames))
+    return take.with_clip(resample(take.clip, fps))
+
+
+def _rng(task: Task) -> np.random.Generator:
+    return np.random.default_rng(task.seed)
+
+
+def checked(clip: object, source: Clip, sample_id: str, *, own_bones: bool = False, same_length: bool = True) -> Clip:
+    """An answer that may be scored: a Clip with the source's frames, fps and bones.
+
+    Raises
+    ------
+    BadOutput : naming the sample, what was expected and what came.
+    """
+    if not isinstance(clip, Clip):
+        raise BadOutput(f"expected a Clip, got {type(clip).__name__}", where=sample_id)
+    if same_length and clip.n_frames != source.n_frames:
+        raise BadOutput(f"expected {source.n_frames} frames, got {clip.n_frames}", where=sample_id)
+    if abs(clip.fps - source.fps) > 1e-6:
+        raise BadOutput(f"expected {source.fps} fps, got {clip.fps}", where=sample_id)
+    if not clip.skeleton.is_canonical:
+        raise BadOutput("expected the canonical 21 joints", where=sample_id)
+    if not own_bones and not clip.skeleton.same_bones(source.skeleton):
+        raise BadOutput(
+            "the output's bones differ from the content clip's",
+            where=sample_id,
+            cause="the style reference's skeleton was returned",
+            remedy="answer with content.clip.with_motion(...) or bench.motion.pose.onto_skeleton(...)",
+        )
+    return clip

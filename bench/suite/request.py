@@ -1,0 +1,147 @@
+"""What a run is asked for: datasets, methods, protocols, limits; and what is refused before anything is read."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bench.adapters import ADAPTERS
+from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
+from bench.errors import BadConfig
+from bench.protocols import PROTOCOLS
+from bench.protocols.base import Protocol
+from bench.suite.workers import Limits
+
+OWN_PROTOCOLS = {
+    protocol.track: protocol
+    for protocol in PROTOCOLS.values()
+    if protocol.name == f"stylebench-{protocol.track}" and protocol.condition == "standard"
+}
+"""Track -> our own protocol for it."""
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What to run.
+
+    Attributes
+    ----------
+    data : dataset name -> path (None for generated data).
+    methods : names; empty means all anchors and fast methods that fit the dataset.
+    adapter_files : ``FILE.py[:Class]`` each, run beside the methods.
+    tracks : our own protocol of each of these tracks.
+    protocols : labels in PROTOCOLS, run beside the tracks; a name without a condition means all of its conditions.
+    profile : ``quick`` or ``standard``.
+    out, store : run folder and store folder.
+    command : as typed, for the records.
+    """
+
+    data: dict[str, Path | None]
+    out: Path
+    store: Path
+    methods: tuple[str, ...] = ()
+    adapter_files: tuple[str, ...] = ()
+    tracks: tuple[str, ...] = ("transfer",)
+    protocols: tuple[str, ...] = ()
+    profile: str = "quick"
+    jobs: int = 2
+    seed: int = 0
+    budget: str = "small"
+    split: str = "default"
+    retrain_judges: bool = False
+    limits: Limits = field(default_factory=Limits)
+    command: str = ""
+
+
+def sources_of(request: RunRequest) -> list[AdapterSource]:
+    """The adapters of a run, named ones first checked for existence.
+
+    Raises
+    ------
+    BadConfig : an unknown name or file.
+    """
+    names = request.methods or tuple(ADAPTERS)
+    sources = [AdapterSource(name) for name in names]
+    for source in sources:
+        find_adapter(source)
+    sources += [source_from_option(option) for option in request.adapter_files]
+    seen: set[str] = set()
+    for source in sources:
+        if source.name in seen:
+            raise BadConfig(f"two adapters are called {source.name!r}", remedy="give yours another name")
+        seen.add(source.name)
+    return sources
+
+
+def protocols_of(request: RunRequest) -> list[Protocol]:
+    """Protocols of the tracks and labels asked for, in the order of the table.
+
+    Raises
+    ------
+    BadConfig : an unknown track, protocol or profile.
+    """
+    chosen = {OWN_PROTOCOLS[track].label for track in request.tracks if _known(track, OWN_PROTOCOLS, "track")}
+    for name in request.protocols:
+        conditions = [label for label in PROTOCOLS if label.partition("/")[0] == name.removesuffix("/*")]
+        if name in PROTOCOLS:
+            chosen.add(name)
+        elif conditions:
+            chosen.update(conditions)
+        else:
+            _known(name, PROTOCOLS, "protocol")
+    found = [protocol for label, protocol in PROTOCOLS.items() if label in chosen]
+    for protocol in found:
+        if request.profile not in protocol.n_samples:
+            raise BadConfig(
+                f"unknown profile {request.profile!r}", remedy=f"choose from {', '.join(protocol.n_samples)}"
+            )
+    return found
+
+
+def _known(name: str, table: Mapping[str, Protocol], what: str) -> bool:
+    if name not in table:
+        raise BadConfig(f"unknown {what} {name!r}", remedy=f"choose from {', '.join(sorted(table))}")
+    return True
+
+
+def check_request(request: RunRequest) -> None:
+    """Refuse what can be refused without reading any data; writes nothing.
+
+    Raises
+    ------
+    BadConfig : unknown names, or folders that cannot be written.
+    """
+    sources_of(request)
+    protocols_of(request)
+    for option, folder in (("--out", request.out), ("--store", request.store)):
+        _check_writable(folder, option)
+
+
+def _check_writable(folder: Path, option: str) -> None:
+    existing = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.exists())
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        raise BadConfig(
+            f"{folder} cannot be written: {existing} is not a writable folder", remedy=f"choose another with {option}"
+        )
+
+
+def latest_link(out: Path) -> None:
+    """Point ``latest`` beside a run folder at it."""
+    link = out.parent / "latest"
+    draft = out.parent / f".latest-{os.getpid()}"
+    draft.unlink(missing_ok=True)
+    draft.symlink_to(out.name)
+    if link.is_dir() and not link.is_symlink():
+        shutil.rmtree(link)
+    draft.replace(link)
+
+
+def default_out(runs: Path) -> Path:
+    """``runs/<date>-<time>``, with a number behind it where that exists."""
+    stamp = time.strftime("%Y%m%d-%H%M%S")
+    names = [stamp, *(f"{stamp}-{number}" for number in range(2, 100))]
+    return next(runs / name for name in names if not (runs / name).exists())

@@ -1,0 +1,38 @@
+"""True answers of a task list, for the dataset that knows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from bench.datasets.take import Take
+from bench.suite.motions import Motions
+from bench.suite.setting import Setting
+from reports.records import digest_of
+
+TRUTH_VERSION = 1
+KNOWN_FOR = "procedural"
+
+
+def truth_key(setting: Setting) -> str:
+    """Key of the stored true answers; empty where the dataset does not know them."""
+    if setting.dataset.name != KNOWN_FOR:
+        return ""
+    facts = {"version": TRUTH_VERSION, "dataset": setting.dataset.digest, "tasks": setting.tasks_digest}
+    return digest_of(facts)
+
+
+def true_answers(setting: Setting, folder: Path) -> dict[str, Any]:
+    """Render the true answer of every task into an empty folder."""
+    from bench.datasets.procedural import true_answer
+
+    answers = [
+        Take(
+            true_answer(task.content_take_id, task.start_frame, task.n_frames, task.target_style),
+            content=task.content,
+            style=task.target_style,
+        )
+        for task in setting.tasks
+    ]
+    Motions.of(answers).save(folder)
+    return {"n": len(answers)}
