@@ -24,6 +24,7 @@ def test_log_odds_by_hand() -> None:
     assert target_log_odds(scores, 0, 2).tolist() == [-1.5, -1.0]
     assert target_log_odds(scores, 2, 0).tolist() == [1.5, 1.0]
     assert target_log_odds(np.zeros((4, 5, 3)), 0, 1).shape == (4, 5)
+    assert target_log_odds([0.5, 2.0], 0, 1) == pytest.approx(1.5)
 
 
 def test_log_odds_are_the_same_from_logits_and_log_probabilities() -> None:
@@ -84,6 +85,14 @@ def test_a_step_is_a_mean_of_joint_distances() -> None:
     assert evenness(positions) == pytest.approx(1.5)
 
 
+def test_a_distance_is_taken_over_the_three_axes() -> None:
+    """Steps: one of two joints by (3, 4, 0), a mean of 2.5; then one by (0, 0, 1), 0.5. 2.5 over 1.5."""
+    positions = np.zeros((3, 1, 2, 3))
+    positions[1:, 0, 0] = 3.0, 4.0, 0.0
+    positions[2, 0, 1, 2] = 1.0
+    assert evenness(positions) == pytest.approx(2.5 / 1.5)
+
+
 def test_evenness_ignores_direction_scale_and_a_common_motion() -> None:
     positions = np.random.default_rng(0).standard_normal((5, 4, 3, 3))
     measured = evenness(positions)
@@ -107,6 +116,7 @@ def test_end_recognition_by_hand() -> None:
     """First sample right at both ends; second: wrong style at the start, wrong content at the end."""
     assert end_recognition_percent(SEEN_CONTENTS, SEEN_STYLES, CONTENTS, STARTS, TARGETS) == 50.0
     assert end_recognition_percent(SEEN_CONTENTS, SEEN_STYLES, CONTENTS, TARGETS, STARTS) == 25.0
+    assert end_recognition_percent([[0, 0], [1, 0]], [[0, 1], [0, 2]], CONTENTS, STARTS, TARGETS) == 75.0
     right = [[0, 9, 9, 1], [0, 9, 9, 2]]
     assert end_recognition_percent([[0] * 4, [1] * 4], right, CONTENTS, STARTS, TARGETS) == 100.0
 

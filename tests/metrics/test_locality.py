@@ -63,6 +63,16 @@ def test_alignments(source: FloatArray) -> None:
     assert joint_displacement(source, lifted, 1.0, align="start") == pytest.approx(np.full(21, 4.0))
 
 
+def test_start_is_where_the_root_is_in_the_first_frame() -> None:
+    """Root off by 1 m, then 3 m; joint 1 off by 6 m: after the start is taken away 0 and 2 m, and 5 m twice."""
+    source = np.zeros((2, 2, 3))
+    output = source.copy()
+    output[:, 0, 0] = 1.0, 3.0
+    output[:, 1, 0] = 6.0
+    assert joint_displacement(source, output, 1.0, squared=False, align="start") == pytest.approx([1.0, 5.0])
+    assert joint_displacement(source, output, 1.0, squared=False, align="root") == pytest.approx([0.0, 4.0])
+
+
 def test_lists_of_the_table() -> None:
     displacement = np.zeros(21)
     displacement[[3, 4]] = 0.3

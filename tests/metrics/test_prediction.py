@@ -103,6 +103,14 @@ def test_bone_length_loss_by_hand() -> None:
     assert bone_length_loss_m(chain(1.0, 2.0), chain(1.1, 1.7), CHAIN, virtual=(2,)) == pytest.approx(0.1)
 
 
+def test_bones_follow_the_parents_given() -> None:
+    """Four joints, two of them on the root: bones of 3, 4 and 5 m become 3, 6 and 5 m."""
+    true = np.array([[[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 4.0, 5.0]]])
+    predicted = np.array([[[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 6.0, 0.0], [0.0, 6.0, 5.0]]])
+    assert bone_length_loss_m(true, predicted, (-1, 0, 0, 2)) == pytest.approx(2.0 / 3.0)
+    assert bone_length_loss_m(true, predicted, (-1, 0, -1, 2)) == 0.0
+
+
 def test_bone_length_loss_ignores_pose_place_and_argument_order(rng: np.random.Generator) -> None:
     true, other = chain(1.0, 2.0), chain(1.5, 2.0)
     assert bone_length_loss_m(true, true[..., [1, 0, 2]] + 8.0, CHAIN) == pytest.approx(0.0, abs=1e-12)

@@ -68,6 +68,7 @@ def test_deadline_misses_by_hand() -> None:
     durations = [0.005, 0.010, 0.020, 0.040]
     assert [deadline_miss_percent(durations, fps) for fps in DEADLINE_FPS] == [25.0, 50.0, 75.0]
     assert deadline_miss_percent(durations, 30.0, frames_per_call=2) == 0.0
+    assert deadline_miss_percent([1.0, 3.0], 0.5) == 50.0
     assert deadline_miss_percent(durations, 60.0, frames_per_call=2) == 25.0
 
 
