@@ -39,7 +39,7 @@ def check_answer(answer: object, source: Clip, *, n_frames: int | None = None) -
         return [CheckRow("type", False, "a bench.motion.clip.Clip", got, remedy=remedy)]
     wanted = source.n_frames if n_frames is None else n_frames
     rows = [
-        CheckRow("type", True),
+        CheckRow("type", True, "a bench.motion.clip.Clip", "a Clip"),
         CheckRow(
             "frames",
             answer.n_frames == wanted,
@@ -56,10 +56,9 @@ def check_answer(answer: object, source: Clip, *, n_frames: int | None = None) -
             "the method works at another rate",
             "resample to content.clip.fps (bench.motion.edit.resample)",
         ),
+        _skeleton_row(answer, source),
     ]
-    if answer.skeleton is not source.skeleton:
-        rows.append(_skeleton_row(answer, source))
-    if rows[-1].ok and answer.skeleton is not source.skeleton:
+    if rows[-1].ok:
         rows.append(_bones_row(answer, source))
     return [*rows, _units_row(answer, source), _teleport_row(answer, source)]
 
@@ -93,13 +92,16 @@ def _skeleton_row(answer: Clip, source: Clip) -> CheckRow:
 
 
 def _bones_row(answer: Clip, source: Clip) -> CheckRow:
+    expected = "the content's bones to 0.1 mm"
+    if answer.skeleton is source.skeleton:
+        return CheckRow("bone lengths", True, expected, "the same")
     off = np.linalg.norm(answer.skeleton.offsets_m - source.skeleton.offsets_m, axis=1)
     joint = int(off.argmax())
     lengths, wanted = answer.skeleton.bone_lengths_m[joint], source.skeleton.bone_lengths_m[joint]
     return CheckRow(
         "bone lengths",
         answer.skeleton.same_bones(source.skeleton),
-        "the content's bones to 0.1 mm",
+        expected,
         f"{answer.skeleton.names[joint]} off by {off[joint] * 1000:.1f} mm (length {lengths:.4f} m for {wanted:.4f} m)",
         "the style reference's skeleton or a mean skeleton was returned",
         "answer with content.clip.with_motion(...) or bench.motion.pose.onto_skeleton(...)",

@@ -102,6 +102,10 @@ class External(Adapter):
                 raise
         return self._session
 
+    @property
+    def is_running(self) -> bool:
+        return self._session is not None and self._session.is_open
+
     def close(self) -> None:
         """Let the program leave; the next call starts it again."""
         if self._session is not None:
@@ -110,8 +114,17 @@ class External(Adapter):
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
         return self.transfer_batch([(content, style)], rngs=[rng])[0]
 
-    def transfer_batch(self, pairs: Sequence[tuple[Take, Take]], *, rngs: Sequence[np.random.Generator]) -> list[Clip]:
-        """Several transfers in one message; each has its own generator, so that the answers do not depend on it."""
+    def transfer_batch(
+        self,
+        pairs: Sequence[tuple[Take, Take]],
+        *,
+        rngs: Sequence[np.random.Generator],
+        timeout_s: float | None = None,
+    ) -> list[Clip]:
+        """Several transfers in one message; each has its own generator, so that answers do not depend on the batch.
+
+        ``timeout_s`` replaces the time that ``adapter.toml`` gives them.
+        """
         self._require("transfers")
         session = self.session()
         contents = [self._give(content) for content, _ in pairs]
@@ -121,7 +134,8 @@ class External(Adapter):
             {"content": content, "style": style, "answer": stem, "seed": seed(rng)}
             for content, style, stem, rng in zip(contents, styles, stems, rngs, strict=True)
         ]
-        answer = session.request("transfer", {"tasks": tasks}, self.program.timeouts.task_s * len(tasks))
+        limit_s = self.program.timeouts.task_s * len(tasks) if timeout_s is None else timeout_s
+        answer = session.request("transfer", {"tasks": tasks}, limit_s)
         clips = self._receive(answer, stems, [content.clip for content, _ in pairs])
         self._forget([entry["file"] for entry in contents])
         return clips
@@ -296,7 +310,7 @@ class External(Adapter):
         return f"{kind}-{self._count:06d}"
 
     def _forget(self, names: Sequence[str]) -> None:
-        if self._session is not None and self._session.is_open:
+        if self._session is not None and self.is_running:
             for name in names:
                 (self._session.exchange / name).unlink(missing_ok=True)
 

@@ -65,31 +65,16 @@ class Session:
             raise
 
     def _start(self, command: list[str], log_fd: int) -> None:
-        lifeline_read, lifeline = os.pipe()
-        try:
-            self.process = subprocess.Popen(
-                [sys.executable, "-I", guard.__file__, str(lifeline_read), str(self.exchange), *command],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                bufsize=0,
-                pass_fds=(lifeline_read,),
-                start_new_session=True,
-                cwd=self.program.working_folder,
-                env=_environment(self.program),
-            )
-        except BaseException:
-            os.close(lifeline)
-            raise
-        finally:
-            os.close(lifeline_read)
+        self.process, lifeline = start_guarded(
+            command, self.exchange, working_folder=self.program.working_folder, environment=_environment(self.program)
+        )
         if self.process.stdin is None or self.process.stdout is None or self.process.stderr is None:
             raise MethodFailed("pipes to the program could not be made")
         self._in, self._out, errors = self.process.stdin, self.process.stdout, self.process.stderr
         os.set_blocking(self._in.fileno(), False)
-        pump = threading.Thread(target=_pump_log, args=(errors.fileno(), log_fd, self._log_tail), daemon=True)
+        pump = threading.Thread(target=copy_log, args=(errors.fileno(), log_fd, self._log_tail), daemon=True)
         pump.start()
-        self._end = weakref.finalize(self, _end, self.process, lifeline, pump)
+        self._end = weakref.finalize(self, end_guarded, self.process, lifeline, pump)
 
     @property
     def is_open(self) -> bool:
@@ -240,6 +225,35 @@ class Session:
         return one_line(next((line for line in reversed(lines) if line), ""))
 
 
+def start_guarded(
+    command: list[str], exchange: Path, *, working_folder: Path, environment: dict[str, str]
+) -> tuple[subprocess.Popen[bytes], int]:
+    """Start a command, its three standard streams as pipes, so that nothing of it outlives this process.
+
+    Once the second value, a file descriptor, is closed, the command and all that descends from it are killed and the
+    folder ``exchange`` is removed.
+    """
+    lifeline_read, lifeline = os.pipe()
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-I", guard.__file__, str(lifeline_read), str(exchange), *command],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            bufsize=0,
+            pass_fds=(lifeline_read,),
+            start_new_session=True,
+            cwd=working_folder,
+            env=environment,
+        )
+    except BaseException:
+        os.close(lifeline)
+        raise
+    finally:
+        os.close(lifeline_read)
+    return process, lifeline
+
+
 def parse_message(line: bytes) -> dict[str, Any]:
     """One line of a program as an answer or an event.
 
@@ -295,7 +309,7 @@ def _environment(program: Program) -> dict[str, str]:
     return {**kept, "PYTHONUNBUFFERED": "1", **program.environment}
 
 
-def _pump_log(source: int, target: int, tail: bytearray) -> None:
+def copy_log(source: int, target: int, tail: bytearray) -> None:
     """Copy a program's stderr to the log up to a limit, and keep its last words."""
     left = LOG_BYTES
     while True:
@@ -314,7 +328,7 @@ def _pump_log(source: int, target: int, tail: bytearray) -> None:
             return
 
 
-def _end(process: subprocess.Popen[bytes], lifeline: int, pump: threading.Thread) -> None:
+def end_guarded(process: subprocess.Popen[bytes], lifeline: int, pump: threading.Thread) -> None:
     """Let go of the lifeline: the guard kills what is left and leaves."""
     os.close(lifeline)
     try:
