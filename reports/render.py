@@ -13,6 +13,7 @@ import pandas as pd
 from tabulate import tabulate
 
 from reports.aggregate import Estimate
+from reports.columns import Part
 from reports.context import anchor_meanings, context
 from reports.formatting import (
     ARROWS,
@@ -24,7 +25,7 @@ from reports.formatting import (
     one_line,
     with_interval,
 )
-from reports.tables import SECTION_TITLES, Column, Part, Section, Table, TableRow
+from reports.tables import SECTION_TITLES, Column, Section, Table, TableRow
 
 Format = Literal["text", "md", "csv", "latex", "html"]
 TEMPLATES = Path(__file__).with_name("templates")

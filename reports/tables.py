@@ -8,28 +8,17 @@ from pathlib import Path
 from typing import Literal
 
 from reports.aggregate import Estimate, estimate, sorted_rows, tie_groups
+from reports.columns import ColumnChoice, Part, columns_of
 from reports.formatting import ARROWS, one_line
 from reports.records import Better, JudgeFacts, Measurement
 from reports.rows import GroupKey, Row, StoredRecord, groups, load_run, rows_of
 
-Part = Literal["main", "details"]
 Section = Literal["methods", "anchors", "unfinished"]
 SECTION_TITLES: dict[Section, str] = {
     "methods": "Methods",
     "anchors": "Anchor rows and rows that copy (no rank)",
     "unfinished": "Not finished",
 }
-
-
-@dataclass(frozen=True)
-class ColumnChoice:
-    """A column wanted for a track; the first of ``slices`` that the records have is shown."""
-
-    metric: str
-    title: str
-    part: Part = "main"
-    slices: tuple[str, ...] = ("different_content", "all")
-    interval: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,35 +98,6 @@ class Table:
         return tuple(column for column in self.columns if column.part == part)
 
 
-_SAME = ("same_content",)
-_ALL = ("all", "different_content")
-TRACK_COLUMNS: dict[str, tuple[ColumnChoice, ...]] = {
-    "transfer": (
-        ColumnChoice("joint_recognition", "joint recognition", interval=True),
-        ColumnChoice("joint_recognition_ratio", "of real"),
-        ColumnChoice("conditional_kid", "conditional KID", interval=True),
-        ColumnChoice("copied_share", "copied share", slices=_ALL),
-        ColumnChoice("cra", "CRA"),
-        ColumnChoice("sra", "SRA"),
-        ColumnChoice("jerk_ratio", "jerk ratio", slices=_ALL),
-        ColumnChoice("joint_recognition", "joint recognition, same content", "details", _SAME, interval=True),
-        ColumnChoice("cra_balanced", "CRA balanced", "details"),
-        ColumnChoice("sra_balanced", "SRA balanced", "details"),
-        ColumnChoice("source_style_residue", "source style left", "details"),
-        ColumnChoice("conditional_fmd", "conditional FMD", "details"),
-        ColumnChoice("fmd[stgcn-content]", "FMD content", "details", _ALL),
-        ColumnChoice("fmd[stgcn-style]", "FMD style", "details", _ALL),
-        ColumnChoice("fmd[dae]", "FMD dae", "details", _ALL),
-        ColumnChoice("kid[stgcn-content]", "KID content", "details", _ALL),
-        ColumnChoice("kid[stgcn-style]", "KID style", "details", _ALL),
-        ColumnChoice("jerk_ratio_worst_content", "jerk ratio, worst content", "details", _ALL),
-        ColumnChoice("time_correlation", "time correlation", "details", _ALL),
-        ColumnChoice("bone_drift", "bone drift", "details", _ALL),
-    ),
-}
-"""Columns by track, the primary first. A track that is not named shows every measurement its records have."""
-
-
 def build_tables(stored: Sequence[StoredRecord]) -> tuple[Table, ...]:
     """All tables of a run, in a fixed order. Raises BadRecord where records must not stand in one table."""
     return tuple(build_table(key, items) for key, items in groups(stored).items())
@@ -151,7 +111,7 @@ def tables_of_run(folder: Path) -> tuple[Table, ...]:
 def build_table(key: GroupKey, stored: Sequence[StoredRecord]) -> Table:
     """The table of one group of records (see :func:`reports.rows.groups`)."""
     rows = rows_of(stored)
-    columns = _columns(key.track, rows)
+    columns = _columns(key, rows)
     ranks: dict[str, int] = {}
     if columns:
         rows = tuple(sorted_rows(rows, columns[0].metric, columns[0].slice))
@@ -171,14 +131,14 @@ def build_table(key: GroupKey, stored: Sequence[StoredRecord]) -> Table:
     )
 
 
-def _columns(track: str, rows: Sequence[Row]) -> tuple[Column, ...]:
+def _columns(key: GroupKey, rows: Sequence[Row]) -> tuple[Column, ...]:
     found: dict[tuple[str, str], list[Measurement]] = {}
     for row in rows:
         for record in row.ok:
             for measurement in record.measurements:
                 found.setdefault((measurement.name, measurement.slice), []).append(measurement)
     columns = []
-    for choice in TRACK_COLUMNS.get(track) or _every_measurement(list(found)):
+    for choice in columns_of(key.track, key.protocol, key.condition) or _every_measurement(list(found)):
         slice_name = next((name for name in choice.slices if (choice.metric, name) in found), None)
         if slice_name is None:
             continue

@@ -16,6 +16,7 @@ from bench.suite.setting import Setting
 from bench.suite.workers import Outcome
 from reports.records import (
     JudgeFacts,
+    Measurement,
     Provenance,
     Record,
     digest_of,
@@ -33,13 +34,14 @@ def record_of(
     setting: Setting,
     cell: Cell,
     outcome: Outcome,
-    scores: CellScores | None,
-    arrays: Mapping[str, NDArray[Any]],
-    judges: tuple[JudgeFacts, ...],
     made: Provenance,
+    *,
+    measurements: tuple[Measurement, ...] = (),
+    arrays: Mapping[str, NDArray[Any]] | None = None,
+    motions_digest: str = "",
+    judges: tuple[JudgeFacts, ...] = (),
 ) -> Record:
     """The record of one cell; a failed one carries the outcome's reason and no numbers."""
-    measurements = tuple(m for scored in scores.scored.values() for m in scored.measurements) if scores else ()
     copied = next((m.value for m in measurements if (m.name, m.slice) == ("copied_share", "all")), None)
     return Record(
         key=record_key(setting, cell),
@@ -59,10 +61,10 @@ def record_of(
         log=outcome.log,
         copies=copied is not None and copied > COPIES_PERCENT,
         measurements=measurements,
-        judges=judges if scores else (),
+        judges=judges,
         protocol_facts=protocol_facts(setting),
-        motions_digest=scores.motions_digest if scores else "",
-        samples_digest=digest_of_arrays(arrays) if scores else "",
+        motions_digest=motions_digest,
+        samples_digest=digest_of_arrays(arrays) if arrays else "",
         provenance=made,
     )
 
@@ -104,10 +106,10 @@ def sample_arrays(scores: CellScores) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def write(folder: Path, record: Record, arrays: Mapping[str, NDArray[Any]]) -> Path:
+def write(folder: Path, record: Record, arrays: Mapping[str, NDArray[Any]] | None = None) -> Path:
     """Store a record and its samples file; the samples first, so that a record never lacks its file."""
     path = folder / f"{record.key}.json"
-    if record.status == "ok":
+    if arrays:
         buffer = io.BytesIO()
         np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
         write_bytes_atomically(samples_path(path), buffer.getvalue())

@@ -31,6 +31,9 @@ from bench.suite.store import Store
 
 Send = Callable[[dict[str, Any]], None]
 
+FIT_ONLY = "fit"
+"""In place of a track: the adapter is fitted and nothing is generated."""
+
 
 @dataclass(frozen=True)
 class GenerateJob:
@@ -90,7 +93,8 @@ def main(arguments: list[str]) -> int:
     for cell in job.cells:
         send({"event": "begin", "cell": cell.key})
         try:
-            _generate(job, cell, adapter, pack, send)
+            if cell.track != FIT_ONLY:
+                _generate(job, cell, adapter, pack, send)
         except Exception as error:
             send(_failure(cell.key, error))
         else:

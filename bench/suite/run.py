@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from bench.datasets.table import load_dataset
 from bench.errors import BadData
 from bench.metrics import METRICS
 from bench.suite import assemble
-from bench.suite.cell import GenerateJob, Job
+from bench.suite.cell import GenerateJob
 from bench.suite.embedding import Embedding
 from bench.suite.judging import JudgesOnDisk, judges_for, stored_embedding
 from bench.suite.motions import Motions
@@ -25,12 +25,10 @@ from bench.suite.request import RunRequest, check_request, protocols_of, sources
 from bench.suite.score import Scorer, ScoreSpec, pin_threads, score_in_process
 from bench.suite.setting import Setting, prepare
 from bench.suite.store import Store
+from bench.suite.timed import Progress, job_of, time_cells
 from bench.suite.truth import true_answers, truth_key
 from bench.suite.workers import Outcome, run_job
-from reports.records import Record
-
-Progress = Callable[[str, str, int, int], None]
-"""Called as ``progress(stage, what, done, total)``; stages are ``data``, ``judges``, ``reference``, ``cells``."""
+from reports.records import Provenance, Record
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,11 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     records: list[Record] = []
     generated = scored = 0
     for setting in planned.settings:
-        part = _RunSetting(request, setting, store, progress).run(records_folder)
+        cells = _cells(request, setting)
+        if setting.protocol.track == "runtime":
+            records.extend(time_cells(request, setting, cells, store, progress, records_folder))
+            continue
+        part = _RunSetting(request, setting, store, progress).run(cells, records_folder)
         records.extend(part.records)
         generated += part.generated
         scored += part.scored
@@ -144,8 +146,7 @@ class _RunSetting:
         self.generated: list[str] = []
         self.scored: list[str] = []
 
-    def run(self, records_folder: Path) -> RunResult:
-        cells = _cells(self.request, self.setting)
+    def run(self, cells: Sequence[Cell], records_folder: Path) -> RunResult:
         self._ensure_reference()
         self.progress("cells", self._name, 0, len(cells))
         context = multiprocessing.get_context("spawn")
@@ -230,19 +231,10 @@ class _RunSetting:
         return Outcome("ok")
 
     def _generate(self, cell: Cell) -> Outcome:
-        setting = self.setting
-        tasks_file = str(setting.write_tasks(self.store))
-        job = Job(
-            source=cell.source,
-            dataset=setting.dataset.name,
-            pack=str(setting.pack_folder),
-            store=str(self.store.root),
-            fit_take_ids=setting.fit_take_ids,
-            disjoint_take_ids=tuple(take.take_id for take in setting.part(*setting.protocol.floor_parts)),
-            fit_key=cell.fit_key,
-            budget=cell.budget,
-            seed=cell.seed,
-            cells=(GenerateJob(cell.motions_key, tasks_file, setting.protocol.track, setting.protocol.fps),),
+        protocol = self.setting.protocol
+        tasks_file = str(self.setting.write_tasks(self.store))
+        job = job_of(
+            self.setting, cell, self.store, GenerateJob(cell.motions_key, tasks_file, protocol.track, protocol.fps)
         )
 
         def listener(key: str, what: str, done: int, total: int) -> None:
@@ -260,16 +252,29 @@ class _RunSetting:
         return outcomes
 
     def _record(self, cell: Cell, outcome: Outcome, folder: Path) -> Record:
-        scores = self.scorer.collect(cell.motions_key, given=cell.given) if outcome.status == "ok" else None
-        arrays = assemble.sample_arrays(scores) if scores else {}
-        facts: dict[str, Any] = self.store.facts("motions", cell.motions_key) if scores else {}
-        made = provenance(
+        if outcome.status != "ok":
+            record = assemble.record_of(self.setting, cell, outcome, self._made({}))
+            assemble.write(folder, record)
+            return record
+        scores = self.scorer.collect(cell.motions_key, given=cell.given)
+        arrays = assemble.sample_arrays(scores)
+        record = assemble.record_of(
+            self.setting,
+            cell,
+            outcome,
+            self._made(self.store.facts("motions", cell.motions_key)),
+            measurements=tuple(m for scored in scores.scored.values() for m in scored.measurements),
+            arrays=arrays,
+            motions_digest=scores.motions_digest,
+            judges=self.judges.judges.facts if self.judges else (),
+        )
+        assemble.write(folder, record, arrays)
+        return record
+
+    def _made(self, facts: Mapping[str, Any]) -> Provenance:
+        return provenance(
             self.request.command,
             threads=self.request.limits.threads,
             wall_s=float(facts.get("wall_s", 0.0)),
             peak_rss_mb=float(facts.get("peak_rss_mb", 0.0)),
         )
-        judges = self.judges.judges.facts if self.judges else ()
-        record = assemble.record_of(self.setting, cell, outcome, scores, arrays, judges, made)
-        assemble.write(folder, record, arrays)
-        return record

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, TypeVar
@@ -83,6 +83,10 @@ class Basis:
     def slices(self) -> dict[str, BoolArray]:
         """Slice name -> mask over the tasks."""
         return slices_of(self.tasks, self.content_labels, self.style_labels)
+
+    def present(self, names: Iterable[str]) -> list[str]:
+        """Those of the named slices that hold a task."""
+        return [name for name in names if name in self.slices]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -233,7 +237,7 @@ def share_score(
     """A percent metric from per-judge, per-sample hits ``[S, n]`` (NaN = does not count)."""
     per_sample = 100.0 * recognition.share_of_judges(correct)
     measurements, replicates = [], {}
-    for slice_name in slices:
+    for slice_name in reference.present(slices):
         mask = reference.slices[slice_name]
         shares = [recognition.percent(hits[mask]) for hits in correct]
         draws = mean_replicates(per_sample[mask], reference.counts[:, mask])
@@ -257,7 +261,7 @@ def mean_score(
 ) -> Scored:
     """A metric that is the mean of per-sample values ``[n]``; NaN values do not count and are explained."""
     measurements, replicates = [], {}
-    for slice_name in slices:
+    for slice_name in basis.present(slices):
         mask = basis.slices[slice_name] & np.isfinite(values)
         left_out = int(basis.slices[slice_name].sum() - mask.sum())
         reason = f"{left_out} samples left out: {undefined}" if left_out else ""

@@ -51,7 +51,7 @@ class _Fmd:
 def _conditional(name: str, row: Row, reference: Reference, form: _Kid | _Fmd) -> Scored:
     generated = Labelled(row.embedding, row.contents, row.styles)
     measurements, replicates = [], {}
-    for slice_name in (PRIMARY_SLICE, "all"):
+    for slice_name in reference.present((PRIMARY_SLICE, "all")):
         mask = reference.slices[slice_name]
         counts = reference.counts[:, mask]
         sides = {kind: _sides(kind, generated, reference, form, mask, counts) for kind in SIDES}

@@ -67,9 +67,10 @@ def _slices(reference: Reference) -> tuple[str, ...]:
 def _start_styles(row: Row, reference: Reference) -> IntArray:
     """``[G]`` style index at weight 0: the start reference's, or the source's own."""
     index = {label: place for place, label in enumerate(reference.style_labels)}
-    own = row.source_styles[::N_WEIGHTS]
     named = [reference.pack.take(t.start_take_id).style if t.start_take_id else None for t in reference.tasks]
-    return np.array([style if name is None else index[str(name)] for name, style in zip(named, own, strict=True)])
+    return np.array(
+        [style if name is None else index[str(name)] for name, style in zip(named, row.source_styles, strict=True)]
+    )
 
 
 def _grouped(values: FloatArray) -> FloatArray:

@@ -39,18 +39,24 @@ def copied_share(row: Row, reference: Reference) -> Scored:
 def jerk_ratio(row: Row, reference: Reference) -> Scored:
     """Mean jerk over that of real motion with the same mixture of contents."""
     jerk = row.jerk
-    per_content = np.array(
-        [reference.floor_jerk[reference.floor.contents == c].mean() for c in range(len(reference.content_labels))]
-    )
+    known = [reference.floor_jerk[reference.floor.contents == c] for c in range(len(reference.content_labels))]
+    per_content = np.array([values.mean() if len(values) else np.nan for values in known])
     expected = per_content[row.contents]
+    comparable = np.isfinite(expected)
+    contents = [s for s in reference.slices if s.startswith("content=")]
     measurements, replicates = [], {}
-    for slice_name in ("all", PRIMARY_SLICE, *(s for s in reference.slices if s.startswith("content="))):
-        mask = reference.slices[slice_name]
+    for slice_name in reference.present(("all", PRIMARY_SLICE, *contents)):
+        mask = reference.slices[slice_name] & comparable
+        left_out = int((reference.slices[slice_name] & ~comparable).sum())
+        reason = f"{left_out} samples left out: no real motion of their content to compare with" if left_out else ""
+        if not mask.any():
+            measurements.append(measure("jerk_ratio", slice_name, float("nan"), 0, reason=reason))
+            continue
         counts = reference.counts[:, mask]
         draws = mean_replicates(jerk[mask], counts) / mean_replicates(expected[mask], counts)
         replicates[f"jerk_ratio|{slice_name}"] = draws
         value = physics.ratio_to_reference(expected[mask], jerk[mask])
-        measurements.append(measure("jerk_ratio", slice_name, value, int(mask.sum()), replicates=draws))
+        measurements.append(measure("jerk_ratio", slice_name, value, int(mask.sum()), replicates=draws, reason=reason))
     return Scored(tuple(measurements), {"jerk": jerk}, replicates)
 
 
@@ -67,7 +73,7 @@ def time_correlation(row: Row, reference: Reference) -> Scored:
     """Correlation over time with the source."""
     values = physics.time_correlation(row.source.window_positions, row.motions.window_positions, joints=row.joints)
     measurements, replicates = [], {}
-    for slice_name in ("all", PRIMARY_SLICE):
+    for slice_name in reference.present(("all", PRIMARY_SLICE)):
         mask = reference.slices[slice_name] & np.isfinite(values)
         if not mask.any():
             reason = "undefined: the outputs do not move"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bench.arrays import FloatArray
@@ -14,6 +16,8 @@ from bench.motion.skeleton import CANONICAL_PARENTS
 from bench.suite.scores.base import Basis, PlainRow, Scored, mean_score
 
 FIT_FRAMES_PER_TAKE = 20
+FEATURE_GROUPS = {"position": slice(0, 3), "rotation": slice(3, 9), "velocity": slice(9, 12)}
+"""Kinds of features by their channels; the error over each is in the details."""
 
 
 def frame_features(before: Clip, frame: Clip) -> FloatArray:
@@ -35,15 +39,26 @@ def frame_features(before: Clip, frame: Clip) -> FloatArray:
 
 def next_frame_error(row: PlainRow, basis: Basis) -> Scored:
     """Mean squared difference of z-scores between predicted and true frame."""
-    statistics = prediction.feature_statistics(_fit_features(basis))
-    values = []
+    pairs = []
     for index, task in enumerate(basis.tasks):
         take = basis.pack.take(task.content_take_id)
         before = crop(take.clip, task.start_frame - 1, 1)
         true = frame_features(before, crop(take.clip, task.start_frame, 1))
-        predicted = frame_features(before, row.motions.clip(index))
-        values.append(prediction.next_frame_error(true[None], predicted[None], statistics))
-    return mean_score("next_frame_error", np.array(values), basis, slices=_slices(basis))
+        pairs.append((true, frame_features(before, row.motions.clip(index))))
+    fit = _fit_features(basis)
+    statistics = prediction.feature_statistics(fit)
+    values = [prediction.next_frame_error(true[None], predicted[None], statistics) for true, predicted in pairs]
+    details = {group: _group_error(pairs, fit, channels) for group, channels in FEATURE_GROUPS.items()}
+    return mean_score("next_frame_error", np.array(values), basis, slices=_slices(basis), details=details)
+
+
+def _group_error(pairs: Sequence[tuple[FloatArray, FloatArray]], fit: FloatArray, channels: slice) -> float:
+    """The same error over one kind of feature."""
+    true, predicted, known = (
+        values.reshape(len(values), 21, 12)[..., channels].reshape(len(values), -1)
+        for values in (*(np.stack(side) for side in zip(*pairs, strict=True)), fit)
+    )
+    return prediction.next_frame_error(true, predicted, prediction.feature_statistics(known))
 
 
 def bone_length_loss(row: PlainRow, basis: Basis) -> Scored:

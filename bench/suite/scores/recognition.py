@@ -70,7 +70,7 @@ def _class_facts(labels: IntArray, n_classes: int) -> dict[str, float]:
 
 def _balanced(name: str, true: IntArray, predicted: NDArray[np.int16], reference: Reference) -> Scored:
     measurements, replicates = [], {}
-    for slice_name in (PRIMARY_SLICE, "all"):
+    for slice_name in reference.present((PRIMARY_SLICE, "all")):
         mask = reference.slices[slice_name]
         values = [recognition.balanced_accuracy_percent(true[mask], seen[mask]) for seen in predicted]
         counts = reference.counts[:, mask]
