@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -227,8 +228,20 @@ class _RunSetting:
             self.generated.append(cell.motions_key)
         digest = str(self.store.facts("motions", cell.motions_key)["motions_digest"])
         if self.scorer.missing(digest, cell.given):
-            self.scored.extend(pool.submit(score_in_process, self.spec, cell.motions_key, cell.given).result())
+            try:
+                self.scored.extend(pool.submit(score_in_process, self.spec, cell.motions_key, cell.given).result())
+            except Exception as error:
+                return self._failed_scoring(cell, error)
         return Outcome("ok")
+
+    def _failed_scoring(self, cell: Cell, error: Exception) -> Outcome:
+        """A row that cannot be scored is a record like any other failure: every other row goes on."""
+        logs = self.request.out / "logs"
+        logs.mkdir(parents=True, exist_ok=True)
+        log = logs / f"{cell.facts.name}-scoring.log"
+        log.write_text("".join(traceback.format_exception(error)))
+        reason = f"scoring raised {type(error).__name__}: {error}"
+        return Outcome("failed", " ".join(reason.split())[:300], f"{logs.name}/{log.name}")
 
     def _generate(self, cell: Cell) -> Outcome:
         protocol = self.setting.protocol

@@ -142,6 +142,9 @@ def join_jerk_ratio(row: SegmentRow, reference: Reference) -> Scored:
         ratios.append(physics.jerk_per_sample(np.stack(around), motions.fps, joints=row.joints))
     inside = physics.jerk_per_sample(row.source_positions_m, row.source.fps, joints=row.joints)
     at_output, at_source = ratios
+    name = "join_jerk_ratio"
+    if row.jerk.mean() == 0.0:
+        return Scored((measure(name, "all", float("nan"), 0, reason="undefined: the outputs do not move"),))
     value = (at_output.mean() / row.jerk.mean()) / (at_source.mean() / inside.mean())
     draws = mean_replicates(inside, reference.counts) / mean_replicates(row.jerk, reference.counts)
     draws = draws * at_output.mean() / at_source.mean()
@@ -150,6 +153,5 @@ def join_jerk_ratio(row: SegmentRow, reference: Reference) -> Scored:
         "jerk_at_joins": float(at_output.mean()),
         "jerk_at_joins_of_source": float(at_source.mean()),
     }
-    name = "join_jerk_ratio"
     found = measure(name, "all", float(value), row.motions.n, replicates=draws, details=details)
     return Scored((found,), {}, {f"{name}|all": draws})
