@@ -79,6 +79,7 @@ def _task(
         reference_content=other,
         seed=int(rng.integers(2**31)),
         n_frames=0,
+        group="slice:intra" if name == other else "slice:inter",
     )
 
 

@@ -158,6 +158,7 @@ def test_tasks_name_sequences_and_their_labels(evaluation: list[Take]) -> None:
         assert (content.content, content.style) == (task.content, task.source_style) and task.source_style == "neutral"
         assert (style.content, style.style) == (task.reference_content, task.target_style)
         assert task.target_style != "neutral" and task.n_frames == 0
+        assert task.group == ("slice:intra" if task.same_content else "slice:inter")
 
 
 def test_a_pool_without_all_sequences_is_refused(evaluation: list[Take]) -> None:

@@ -24,7 +24,7 @@ from bench.motion.kinematics import world_positions
 from bench.protocols.base import Task
 from bench.suite.motions import Motions
 from bench.suite.scores.base import Basis, PlainRow, Scored
-from bench.suite.scores.gesture import FORMS, gesture_error, gesture_error_to_truth, hand_error, slices_of_pairs
+from bench.suite.scores.gesture import FORMS, gesture_error, gesture_error_to_truth, hand_error
 from reports.bootstrap import cluster_counts
 from reports.records import Measurement
 from tests.motion.factory import person, random_clip
@@ -59,6 +59,7 @@ def task(content: int, style: int) -> Task:
         reference_content=str(STYLES[style].content),
         seed=0,
         n_frames=0,
+        group="slice:intra" if content == style else "slice:inter",
     )
 
 
@@ -161,9 +162,12 @@ def test_slices_intervals_and_replicates(basis: Basis) -> None:
     assert measured.low <= measured.value <= measured.high
 
 
-def test_a_slice_without_tasks_is_left_out() -> None:
-    assert set(slices_of_pairs([task(0, 0)])) == {"all", "intra"}
-    assert set(slices_of_pairs([task(0, 1)])) == {"all", "inter"}
+@pytest.mark.parametrize(("pair", "name"), [((0, 0), "intra"), ((0, 1), "inter")])
+def test_a_slice_without_tasks_is_left_out(pair: tuple[int, int], name: str, basis: Basis) -> None:
+    one = replace(basis, tasks=[task(*pair)], counts=basis.counts[:, :1])
+    row = PlainRow(Motions.of([CONTENTS[0]]), Motions.of([CONTENTS[0]]))
+    scored = hand_error("style_error", row, one)
+    assert [m.slice for m in scored.measurements] == ["all", name]
 
 
 def test_intra_details_hold_the_error_against_the_other_sample(basis: Basis) -> None:

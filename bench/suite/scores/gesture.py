@@ -7,7 +7,7 @@ against the style sample, style error against the content sample (Kuriyama et al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -32,7 +32,8 @@ from bench.suite.motions import Motions
 from bench.suite.scores.base import Basis, PlainRow, Scored, measure
 from reports.bootstrap import mean_replicates
 
-INTRA, INTER = "intra", "inter"
+INTRA = "intra"
+SLICES = ("all", INTRA, "inter")
 SUMMARIES = ("mean", "worst", "worst_quarter")
 
 Hands = Mapping[Frame, FloatArray]
@@ -149,13 +150,6 @@ def gesture_error_to_truth(row: PlainRow, basis: Basis) -> Scored:
     return _sum("gesture_error[truth]", parts, basis)
 
 
-def slices_of_pairs(tasks: Sequence[Task]) -> dict[str, BoolArray]:
-    """Slice name -> mask over the tasks; slices without a task are left out."""
-    intra = np.array([task.same_content for task in tasks])
-    masks = {"all": np.ones(len(intra), dtype=bool), INTRA: intra, INTER: ~intra}
-    return {name: mask for name, mask in masks.items() if mask.any()}
-
-
 def _sum(name: str, parts: Mapping[str, FloatArray], basis: Basis) -> Scored:
     def details(slice_name: str, mask: BoolArray) -> dict[str, float]:
         return {part: float(values[mask].mean()) for part, values in parts.items()}
@@ -167,7 +161,8 @@ def _scored(
     name: str, values: FloatArray, basis: Basis, details: Callable[[str, BoolArray], dict[str, float]]
 ) -> Scored:
     measurements, replicates = [], {}
-    for slice_name, mask in slices_of_pairs(basis.tasks).items():
+    for slice_name in (name for name in SLICES if name in basis.slices):
+        mask = basis.slices[slice_name]
         draws = mean_replicates(values[mask], basis.counts[:, mask])
         replicates[f"{name}|{slice_name}"] = draws
         mean, n = float(values[mask].mean()), int(mask.sum())
