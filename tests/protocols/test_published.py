@@ -13,6 +13,7 @@ from bench.adapters import ADAPTERS
 from bench.errors import BadConfig, BadFile
 from bench.metrics import METRICS
 from bench.protocols.published import FIELDS, PUBLISHED_CSV, Published, published_numbers, read_published_numbers
+from bench.suite.timing_plan import ONLINE, TimingPlan, offline
 
 NUMBERS_PER_TABLE = {
     "park2021.table1": 6,
@@ -95,6 +96,20 @@ def test_units_meet(row: Published) -> None:
         assert row.unit == unit
     else:
         assert (row.unit, unit, row.factor) in {("count", "B", 4.0), ("KB", "count", 250.0)}
+
+
+def test_slices_are_those_of_our_tracks() -> None:
+    timed = {ONLINE, *(offline(length) for length in TimingPlan().lengths)}
+    allowed = {
+        "fmd": {"all"}, "cra": {"all"}, "sra": {"all"}, "startup_designed": {"all"}, "parameters": {"all"},
+        "bytes_per_style": {"all"}, "joints_above_0.1": {f"part={part}" for part in ("legs", "arms", "spine")},
+        "joints_above_0.05": {f"part={part}" for part in ("legs", "arms", "spine")}, "latency_p50": timed,
+        "frames_per_second": {""},
+    }  # fmt: skip
+    errors = {"intra", "inter", "all", "intra:against_style_sample", "intra:against_content_sample"}
+    for row in ALL:
+        if row.our_metric:
+            assert row.our_slice in allowed.get(row.our_metric.split("[")[0], errors), row
 
 
 def test_one_method_and_metric_and_slice_stand_once_in_a_table() -> None:
