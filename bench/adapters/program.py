@@ -27,13 +27,18 @@ EXCHANGE = "{exchange}"
 """Stands in ``command`` for the folder through which motions travel; containers mount it."""
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
+Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._+-]{0,63}$")]
+Title = Annotated[str, Field(max_length=100)]
+Sentence = Annotated[str, Field(max_length=300)]
 
 
-class _Table(BaseModel):
+class Table(BaseModel):
+    """A TOML table: unknown keys are refused, nothing is converted."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class Timeouts(_Table):
+class Timeouts(Table):
     """Seconds after which the harness gives up; table ``[timeouts]``."""
 
     start_s: Seconds = 120.0
@@ -48,12 +53,12 @@ class Timeouts(_Table):
     """to leave, or to answer a cancellation, before it is killed"""
 
 
-class Program(_Table):
+class Program(Table):
     """What ``adapter.toml`` says."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._+-]{0,63}$")]
-    title: Annotated[str, Field(max_length=100)] = ""
-    description: Annotated[str, Field(max_length=300)] = ""
+    name: Name
+    title: Title = ""
+    description: Sentence = ""
     command: Annotated[tuple[str, ...], Field(min_length=1)]
     """program and arguments; a program with a slash is relative to the file's folder"""
     folder: str = "."
@@ -169,7 +174,7 @@ def program_of(table: dict[str, Any], path: Path) -> Program:
     try:
         program = Program.model_validate({**table, "traits": traits, "toml_file": path.resolve()})
     except ValidationError as error:
-        raise _bad_key(error, path, [*Program.model_fields, *Timeouts.model_fields]) from None
+        raise bad_key(error, path, [*Program.model_fields, *Timeouts.model_fields]) from None
     unknown = [name for name in program.capabilities if name not in CAPABILITIES]
     if unknown:
         raise BadConfig(
@@ -197,7 +202,7 @@ def traits_of(table: Any, where: str) -> Traits:
         # By way of JSON, where strict types still let a table become a dataclass.
         return TypeAdapter(Traits).validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
-        raise _bad_key(error, Path(where), names, "traits.") from None
+        raise bad_key(error, Path(where), names, "traits.") from None
 
 
 def _matches(home: Path, pattern: str, toml_file: Path) -> list[Path]:
@@ -209,7 +214,7 @@ def _matches(home: Path, pattern: str, toml_file: Path) -> list[Path]:
         raise BadConfig(f"{pattern!r} is not a pattern: {error}", where=f"{toml_file}: files") from None
 
 
-def _bad_key(error: ValidationError, path: Path, known: list[str], prefix: str = "") -> BadConfig:
+def bad_key(error: ValidationError, path: Path, known: list[str], prefix: str = "") -> BadConfig:
     # A misspelt key is also a missing one; the misspelling is what helps.
     errors = sorted(error.errors(include_url=False, include_input=False), key=lambda e: e["type"] != "extra_forbidden")
     first = errors[0]
