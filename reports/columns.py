@@ -65,12 +65,13 @@ _GESTURE = ("intra", "all", "inter")
 def _gesture(slices: tuple[str, ...]) -> tuple[ColumnChoice, ...]:
     return (
         ColumnChoice("gesture_error", "content + style", slices=slices, interval=True),
+        ColumnChoice("gesture_error[truth]", "to the true answer", slices=slices),
         ColumnChoice("content_error", "content error", slices=slices),
-        ColumnChoice("content_error_worst", "worst", slices=slices),
-        ColumnChoice("content_error_worst_quarter", "worst 25 %", slices=slices),
+        ColumnChoice("content_error_worst", "content, worst", slices=slices),
+        ColumnChoice("content_error_worst_quarter", "content, worst 25 %", slices=slices),
         ColumnChoice("style_error", "style error", slices=slices),
-        ColumnChoice("style_error_worst", "worst", slices=slices),
-        ColumnChoice("style_error_worst_quarter", "worst 25 %", slices=slices),
+        ColumnChoice("style_error_worst", "style, worst", slices=slices),
+        ColumnChoice("style_error_worst_quarter", "style, worst 25 %", slices=slices),
         ColumnChoice("style_error[1.07s]", "style error, 1.07 s", "details", slices),
         ColumnChoice("style_error[4.27s]", "style error, 4.27 s", "details", slices),
         ColumnChoice("content_error[world]", "content error, world frame", "details", slices),

@@ -18,31 +18,31 @@ from bench.adapters.anchors import (
 )
 from bench.adapters.base import Adapter
 from bench.adapters.fitted_anchors import ClassifyAndRetrieve, MeanPose, NearestPose, StyleMeanShift
+from bench.adapters.gesture_oracles import GESTURE_ORACLES
 from bench.adapters.oracles import LabelOracle, ProceduralTruth, RealDisjoint, RealTest
 
-ADAPTERS: dict[str, type[Adapter]] = {
-    adapter.name: adapter
-    for adapter in (
-        RealTest,
-        RealDisjoint,
-        LabelOracle,
-        ProceduralTruth,
-        CopyContent,
-        CopyStyle,
-        CoinFlip,
-        ConcatenatedHalves,
-        Splice,
-        LinearBlend,
-        RepeatLast,
-        MeanPose,
-        FrozenFrame,
-        NoiseLow,
-        NoiseMiddle,
-        NoiseHigh,
-        StyleMeanShift,
-        PoseAdain,
-        NearestPose,
-        ClassifyAndRetrieve,
-    )
-}
+_TABLE: tuple[type[Adapter], ...] = (
+    RealTest,
+    RealDisjoint,
+    LabelOracle,
+    ProceduralTruth,
+    CopyContent,
+    CopyStyle,
+    CoinFlip,
+    ConcatenatedHalves,
+    Splice,
+    LinearBlend,
+    RepeatLast,
+    MeanPose,
+    FrozenFrame,
+    NoiseLow,
+    NoiseMiddle,
+    NoiseHigh,
+    StyleMeanShift,
+    PoseAdain,
+    NearestPose,
+    ClassifyAndRetrieve,
+    *GESTURE_ORACLES,
+)
+ADAPTERS: dict[str, type[Adapter]] = {adapter.name: adapter for adapter in _TABLE}
 """Name -> adapter class. The order is the order of rows that tie."""

@@ -142,6 +142,8 @@ PARTS_METRICS: tuple[Metric, ...] = (
 GESTURE_METRICS: tuple[Metric, ...] = (
     Metric("gesture_error", 1, "m", "lower", "content error + style error, means", OURS,
            "in the intra condition the style reference is itself a right answer", "gesture"),
+    Metric("gesture_error[truth]", 1, "m", "lower", "content error + style error against the true answer", OURS,
+           "the true answer is 0 in style only; its content error is what the style itself changes", "gesture"),
     Metric("content_error", 1, "m", "lower", "hand distance to the content along the DTW path, mean", HANDS,
            "0 for a copy of the content; another take of the same gestures is far from 0", "gesture"),
     Metric("content_error_worst", 1, "m", "lower", "the same, largest pair", HANDS,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from bench.protocols import motion_puzzle, park2021, style_erd
+from bench.protocols import kuriyama2022, motion_puzzle, park2021, style_erd
 from bench.protocols.base import Protocol
 from bench.protocols.conditions import FOREIGN, LONG, SELF, SHORT
+from bench.protocols.gesture import GESTURE
 from bench.protocols.interpolation import INTERPOLATION, INTERPOLATION_PARTS
 from bench.protocols.latent import LATENT
 from bench.protocols.parts import PARTS_PROTOCOL
@@ -24,6 +25,7 @@ PROTOCOLS: dict[str, Protocol] = {
         INTERPOLATION,
         INTERPOLATION_PARTS,
         PARTS_PROTOCOL,
+        GESTURE,
         RUNTIME,
         PREDICTION,
         park2021.TABLE_1,
@@ -36,6 +38,10 @@ PROTOCOLS: dict[str, Protocol] = {
         style_erd.TABLE_1,
         style_erd.TABLE_1_NEUTRAL,
         style_erd.TABLE_2,
+        kuriyama2022.TABLE_1,
+        kuriyama2022.TABLE_2,
+        kuriyama2022.TABLE_3,
+        kuriyama2022.TABLE_4,
     )
 }
 """``name@version`` or ``name@version/condition`` -> protocol."""

@@ -115,6 +115,7 @@ GESTURE = Protocol(
         *THETAS,
         "style_error[world]",
     ),
+    truth_metrics=("gesture_error[truth]",),
     primary=("gesture_error", "intra"),
     make_tasks=make_tasks,
     extra_takes=evaluation_sequences,

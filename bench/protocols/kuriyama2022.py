@@ -34,6 +34,7 @@ def _table(
         summary=summary,
         n_samples=n_samples,
         metrics=("content_error[fastdtw]", *CONTENT_ERRORS, *STYLE_ERRORS, *THETAS),
+        truth_metrics=(),
         primary=("style_error", slice_name),
         make_tasks=tasks,
         facts={

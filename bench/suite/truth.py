@@ -5,7 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from bench.adapters.gesture_oracles import true_sequence
+from bench.datasets.pack import Pack
 from bench.datasets.take import Take
+from bench.motion.clip import Clip
+from bench.protocols.base import Task
+from bench.suite.answering import source_of
 from bench.suite.motions import Motions
 from bench.suite.setting import Setting
 from reports.records import digest_of
@@ -24,15 +29,18 @@ def truth_key(setting: Setting) -> str:
 
 def true_answers(setting: Setting, folder: Path) -> dict[str, Any]:
     """Render the true answer of every task into an empty folder."""
-    from bench.datasets.procedural import true_answer
-
+    pack = Pack.open(setting.pack_folder)
     answers = [
-        Take(
-            true_answer(task.content_take_id, task.start_frame, task.n_frames, task.target_style),
-            content=task.content,
-            style=task.target_style,
-        )
+        Take(_true_answer(task, pack, setting.protocol.fps), content=task.content, style=task.target_style)
         for task in setting.tasks
     ]
     Motions.of(answers).save(folder)
     return {"n": len(answers)}
+
+
+def _true_answer(task: Task, pack: Pack, fps: float) -> Clip:
+    from bench.datasets.procedural import true_answer
+
+    if task.n_frames:
+        return true_answer(task.content_take_id, task.start_frame, task.n_frames, task.target_style)
+    return true_sequence(source_of(task, pack, fps), task.target_style, pack.by_id, true_answer)

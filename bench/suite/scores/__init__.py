@@ -9,7 +9,17 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from bench.suite.scores import conditions, distances, interpolation, motion, papers, parts, prediction, recognition
+from bench.suite.scores import (
+    conditions,
+    distances,
+    gesture,
+    interpolation,
+    motion,
+    papers,
+    parts,
+    prediction,
+    recognition,
+)
 from bench.suite.scores.base import AnyScore
 
 SCORES: dict[str, AnyScore[Any, Any]] = {
@@ -47,6 +57,9 @@ SCORES: dict[str, AnyScore[Any, Any]] = {
     "evenness": interpolation.evenness,
     "end_recognition": interpolation.end_recognition,
     "middle_content": interpolation.middle_content,
+    "gesture_error": gesture.gesture_error,
+    "gesture_error[truth]": gesture.gesture_error_to_truth,
+    **{name: partial(gesture.hand_error, name) for name in gesture.FORMS},
     "next_frame_error": prediction.next_frame_error,
     "bone_length_loss": prediction.bone_length_loss,
 }
