@@ -1,11 +1,13 @@
-"""A new adapter as text: what ``new-adapter`` writes, ready to be checked and to be changed."""
+"""A new adapter as files: what ``new-adapter`` writes, ready to be checked and to be changed."""
 
 from __future__ import annotations
 
 import keyword
 import re
+import sys
 from pathlib import Path
 
+from bench.adapters import worker
 from bench.errors import BadConfig
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,40}")
@@ -46,6 +48,31 @@ class {class_name}(Adapter):
     # More calls, and what they mean: bench/adapters/base.py.
 '''
 
+PROGRAM_TOML = """\
+# How the benchmark starts this program and what it may ask of it. Every key: docs/adding-a-method.md
+name = "{name}"
+title = "{title}"
+description = "one line for the table"
+
+# The interpreter of your own environment: Python 3.7 or newer with numpy.
+command = ["{python}", "worker.py", "my_code.py"]
+capabilities = ["transfers"]
+
+[traits]
+# Labels are None unless they are asked for here.
+needs_style_label = false
+"""
+
+PROGRAM_CODE = '''"""Your method, in its own environment. What it prints goes to the log; all calls: top of worker.py."""
+
+
+def transfer(content, style):
+    rotations_wxyz = content.rotations_wxyz  # [T, 21, 4] local unit quaternions, w first
+    root_xyz_m = content.root_xyz_m  # [T, 3] metres, Y up
+    # style has the same arrays for the style reference, which may be longer or shorter.
+    return rotations_wxyz, root_xyz_m
+'''
+
 
 def new_adapter_text(name: str) -> str:
     """The text of ``NAME.py``: one adapter class that passes the check as it is.
@@ -82,3 +109,25 @@ def write_new_adapter(name: str, folder: Path) -> Path:
     except OSError as error:
         raise BadConfig(f"cannot be written ({error.strerror})", where=str(path)) from None
     return path
+
+
+def write_new_program(name: str, folder: Path) -> Path:
+    """Write a folder ``NAME`` with ``adapter.toml``, ``my_code.py`` and a copy of ``worker.py``; the path of the TOML.
+
+    Raises
+    ------
+    BadConfig : as :func:`write_new_adapter`.
+    """
+    new_adapter_text(name)
+    home = folder / name
+    toml = PROGRAM_TOML.format(name=name, title=name.replace("_", " "), python=sys.executable)
+    try:
+        home.mkdir()
+        (home / "adapter.toml").write_text(toml, encoding="utf-8")
+        (home / "my_code.py").write_text(PROGRAM_CODE, encoding="utf-8")
+        (home / "worker.py").write_bytes(Path(worker.__file__).read_bytes())
+    except FileExistsError:
+        raise BadConfig(f"{home} is already there", remedy="choose another name, or remove it") from None
+    except OSError as error:
+        raise BadConfig(f"cannot be written ({error.strerror})", where=str(home)) from None
+    return home / "adapter.toml"

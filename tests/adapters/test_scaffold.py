@@ -8,7 +8,7 @@ import pytest
 
 from bench.adapters.check import check_adapter
 from bench.adapters.loading import find_adapter, source_from_option
-from bench.adapters.scaffold import new_adapter_text, write_new_adapter
+from bench.adapters.scaffold import new_adapter_text, write_new_adapter, write_new_program
 from bench.datasets.procedural import load
 from bench.errors import BadConfig
 
@@ -44,3 +44,13 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert (tmp_path / "mine.py").read_text() == "precious"
     with pytest.raises(BadConfig, match="cannot be written"):
         write_new_adapter("mine", tmp_path / "none")
+
+
+def test_new_program_passes_every_check_unchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.adapters.check.GROWTH_CALLS", 60)
+    source = source_from_option(str(write_new_program("my_method", tmp_path)))
+    assert source.name == "my_method"
+    rows = list(check_adapter(find_adapter(source), load(None).takes))
+    assert [row for row in rows if row.ok is False] == []
+    with pytest.raises(BadConfig, match="is already there"):
+        write_new_program("my_method", tmp_path)
