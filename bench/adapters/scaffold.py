@@ -63,7 +63,7 @@ capabilities = ["transfers"]
 needs_style_label = false
 """
 
-PROGRAM_CODE = '''"""Your method, in its own environment. What it prints goes to the log; all calls: top of worker.py."""
+PROGRAM_CODE = '''"""Your method in its own environment. What it prints goes to the log; all calls: top of worker.py."""
 
 
 def transfer(content, style):
