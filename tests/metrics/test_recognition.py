@@ -38,7 +38,7 @@ def test_by_hand() -> None:
     assert percent(correct(TRUE, PREDICTED)) == Share(60.0, 5)
     assert balanced_accuracy_percent(TRUE, PREDICTED) == pytest.approx(100.0 * (2 / 3 + 1 + 0) / 3)
     assert majority_rate_percent(TRUE) == 60.0
-    assert chance_percent(8) == 12.5
+    assert chance_percent(8) == 12.5 and chance_percent(1) == 100.0
     assert confusion_matrix(TRUE, PREDICTED, 3).tolist() == [[2, 1, 0], [0, 1, 0], [1, 0, 0]]
     table = per_class(TRUE, correct(TRUE, PREDICTED))
     assert [share.percent for share in table.values()] == pytest.approx([200 / 3, 100.0, 0.0])
