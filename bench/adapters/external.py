@@ -296,7 +296,10 @@ class External(Adapter):
     def _give_kept(self, take: Take) -> dict[str, Any]:
         """As :meth:`_give`; the file stays, since the same style serves many tasks."""
         arrays = (take.clip.rotations_wxyz, take.clip.root_xyz_m, take.clip.skeleton.offsets_m)
-        digest = hashlib.blake2b(b"".join(array.tobytes() for array in arrays), digest_size=12).hexdigest()
+        hasher = hashlib.blake2b(digest_size=12)
+        for array in arrays:
+            hasher.update(np.ascontiguousarray(array).data)
+        digest = hasher.hexdigest()
         if digest not in self._styles:
             if len(self._styles) >= KEPT_STYLES:
                 self._forget(list(self._styles.values()))

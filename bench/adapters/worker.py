@@ -216,6 +216,7 @@ class Worker:
         self.parents: list[int] = []
         self.kept: dict[str, Motion] = {}
         self.streams: dict[int, Any] = {}
+        self.known: dict[str, list[str]] = {}
 
     def run(self) -> None:
         """Answer until the benchmark says stop or goes away."""
@@ -369,8 +370,9 @@ class Worker:
         """Call the user's function with the optional arguments it has, all usual generators seeded."""
         function = getattr(self.module, name)
         _seed_generators(optional["seed"])
-        known = inspect.signature(function).parameters
-        return function(*arguments, **{key: value for key, value in optional.items() if key in known})
+        if name not in self.known:
+            self.known[name] = list(inspect.signature(function).parameters)
+        return function(*arguments, **{key: value for key, value in optional.items() if key in self.known[name]})
 
     def _motion(self, entry: dict[str, Any]) -> Motion:
         path = str(self.exchange / entry["file"])
@@ -417,9 +419,9 @@ def _seed_generators(seed: int) -> None:
     # Research code draws from the global generators; the same task must give the same answer in any order.
     python_random.seed(seed)
     numpy.random.seed(seed % 2**32)  # noqa: NPY002
-    torch = sys.modules.get("torch")
-    if torch is not None:
-        torch.manual_seed(seed)
+    seed_torch = getattr(sys.modules.get("torch"), "manual_seed", None)
+    if seed_torch is not None:
+        seed_torch(seed)
 
 
 def load_module(path: str) -> Any:
