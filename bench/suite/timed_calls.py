@@ -1,11 +1,10 @@
-"""Calls prepared before the clock starts, timed in one loop, and checked after it has stopped.
+"""Calls prepared before the clock starts, and checked after it has stopped.
 
 What is timed is the adapter's call from end to end: everything between motion in and motion out is the method's own.
 """
 
 from __future__ import annotations
 
-import gc
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,10 +23,9 @@ from bench.motion.clip import Clip
 from bench.motion.edit import crop, join, resample, windows
 from bench.protocols.base import Task
 from bench.suite.answering import checked
+from bench.suite.stopwatch import Stopwatch
 from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan
 
-Clock = Callable[[], int]
-"""Nanoseconds, monotonic."""
 BLEND_S = 0.3
 """Blend at the joins of an input that is longer than its take."""
 
@@ -88,33 +86,17 @@ class Block:
     opening_ns: int | None = None
 
 
-def timed(call: Callable[..., Any], arguments: Sequence[tuple[Any, ...]], clock: Clock) -> tuple[list[int], list[Any]]:
-    """Nanoseconds and output of each call, without garbage collection in between."""
-    durations, outputs = [0] * len(arguments), [None] * len(arguments)
-    gc.collect()
-    gc.disable()
-    try:
-        for place, argument in enumerate(arguments):
-            start = clock()
-            output = call(*argument)
-            durations[place] = clock() - start
-            outputs[place] = output
-    finally:
-        gc.enable()
-    return durations, outputs
-
-
 class Calls:
     """Makes the blocks of one adapter."""
 
     def __init__(
-        self, adapter: Adapter, inputs: Sequence[TimedInput], plan: TimingPlan, seed: int, clock: Clock
+        self, adapter: Adapter, inputs: Sequence[TimedInput], plan: TimingPlan, seed: int, stopwatch: Stopwatch
     ) -> None:
         self.adapter = adapter
         self.inputs = inputs
         self.plan = plan
         self.seed = seed
-        self.clock = clock
+        self.stopwatch = stopwatch
         capabilities = adapter.capabilities()
         self.transfers = "transfers" in capabilities
         self.streams = "streams" in capabilities
@@ -181,9 +163,9 @@ class Calls:
         content = source.cut(first, past + n)
         frames = list(zip(content.clip.rotations_wxyz, content.clip.root_xyz_m, strict=True))
         rng = self._rng()
-        start = self.clock()
+        start = self.stopwatch.now_ns()
         stream = self.adapter.open_stream(source.style, content_label=content.content, rng=rng)
-        opening_ns = self.clock() - start
+        opening_ns = self.stopwatch.now_ns() - start
         before = [stream.step(*frame) for frame in frames[:past]]
 
         def check(outputs: Sequence[Any]) -> None:

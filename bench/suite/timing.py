@@ -6,11 +6,13 @@ import contextlib
 import json
 import os
 import select
+import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +80,7 @@ class _Collected:
     first: dict[str, Any] = field(default_factory=dict)
     warm_up_calls: int = 0
     durations_ns: dict[str, list[int]] = field(default_factory=dict)
+    waited_ns: dict[str, list[int]] = field(default_factory=dict)
     overhead_ns: dict[str, list[int]] = field(default_factory=dict)
     opening_ns: list[int] = field(default_factory=list)
     look_ahead: dict[str, Any] = field(default_factory=dict)
@@ -195,7 +198,13 @@ class _Member:
             look_ahead_to_the_end=got.look_ahead["to_the_end"],
             look_ahead_reason=got.look_ahead["reason"],
         )
-        return Timings(_seconds(got.durations_ns), _seconds(got.overhead_ns), np.array(got.opening_ns) * 1e-9, facts)
+        return Timings(
+            _seconds(got.durations_ns),
+            _seconds(got.waited_ns),
+            _seconds(got.overhead_ns),
+            np.array(got.opening_ns) * 1e-9,
+            facts,
+        )
 
     def _heard(self) -> dict[str, Any]:
         begin = time.monotonic()
@@ -298,9 +307,22 @@ class _Group:
         calls = member.turns[slice_name].calls
         answer = member.ask(do="block", slice=slice_name, round=round_number, calls=calls)
         got.durations_ns.setdefault(slice_name, []).extend(answer["ns"])
+        got.waited_ns.setdefault(slice_name, []).extend(answer["waited_ns"])
         got.overhead_ns.setdefault(slice_name, []).extend(answer["overhead_ns"])
         if answer["opening_ns"] is not None:
             got.opening_ns.append(answer["opening_ns"])
+
+
+@cache
+def _same_layout() -> tuple[str, ...]:
+    """Command that starts another with addresses that are not random, where the system allows it.
+
+    Random addresses alone set two identical programs up to 3 % apart (Mytkowicz et al. 2009 for such effects).
+    """
+    setarch = shutil.which("setarch")
+    if setarch and subprocess.run([setarch, "-R", "true"], capture_output=True).returncode == 0:
+        return (setarch, "-R")
+    return ()
 
 
 def _seconds(durations_ns: Mapping[str, Sequence[int]]) -> dict[str, FloatArray]:

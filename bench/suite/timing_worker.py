@@ -25,8 +25,9 @@ from bench.adapters.loading import find_adapter
 from bench.adapters.oracles import Oracle
 from bench.errors import BadConfig, BadMotion, BadOutput, BenchError
 from bench.suite.look_ahead import LookAhead, measured_look_ahead
+from bench.suite.stopwatch import HostStopwatch, Stopwatch, timed
 from bench.suite.store import Store
-from bench.suite.timed_calls import Calls, Clock, timed, timed_inputs
+from bench.suite.timed_calls import Calls, timed_inputs
 from bench.suite.timing_plan import TimingJob, TimingPlan, read_job
 
 
@@ -48,7 +49,7 @@ def main(arguments: list[str]) -> int:
 
     send({"memory_mb": memory_mb("VmRSS")})
     try:
-        worker = TimingWorker(job, plan, threads, loaded_adapter(job), time.perf_counter_ns)
+        worker = TimingWorker(job, plan, threads, loaded_adapter(job), HostStopwatch())
         send({"loaded": True})
         for line in requests:
             send(worker.answer(json.loads(line)))
@@ -79,12 +80,12 @@ def loaded_adapter(job: TimingJob) -> Adapter:
 class TimingWorker:
     """Answers the parent's requests for one loaded adapter."""
 
-    def __init__(self, job: TimingJob, plan: TimingPlan, threads: int, adapter: Adapter, clock: Clock) -> None:
+    def __init__(self, job: TimingJob, plan: TimingPlan, threads: int, adapter: Adapter, stopwatch: Stopwatch) -> None:
         self.job = job
         self.plan = plan
         self.threads = threads
         self.adapter = adapter
-        self.clock = clock
+        self.stopwatch = stopwatch
         self.calls: Calls | None = None
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -113,16 +114,16 @@ class TimingWorker:
     def _prepare(self) -> dict[str, Any]:
         self._limit_torch()
         inputs = timed_inputs(self.job, self.plan, self.adapter)
-        self.calls = Calls(self.adapter, inputs, self.plan, self.job.seed, self.clock)
+        self.calls = Calls(self.adapter, inputs, self.plan, self.job.seed, self.stopwatch)
         return {"slices": self.calls.slices, "transfers": self.calls.transfers, "streams": self.calls.streams}
 
     def _first(self) -> dict[str, Any]:
         """The first call of all; for a stream, opening it belongs to that."""
         slice_name, block = self.ready.first_block()
-        durations, outputs = timed(block.call, block.arguments, self.clock)
-        block.check(outputs)
+        calls = timed(block.call, block.arguments, self.stopwatch)
+        block.check(calls.outputs)
         self._limit_torch()
-        return {"slice": slice_name, "ns": durations[0] + (block.opening_ns or 0)}
+        return {"slice": slice_name, "ns": calls.durations_ns[0] + (block.opening_ns or 0)}
 
     def _warm_up(self, slice_name: str) -> dict[str, Any]:
         """Calls of one slice until they are enough, or take too much of the time there is; the usual one's duration."""
@@ -130,9 +131,9 @@ class TimingWorker:
         calls = 1
         while len(durations) < self.plan.warm_up_calls and sum(durations) < 1e9 * self.plan.bound_s / 4:
             block = self.ready.block(slice_name, 0, min(calls, self.plan.warm_up_calls - len(durations)))
-            taken, outputs = timed(block.call, block.arguments, self.clock)
-            block.check(outputs)
-            durations += taken
+            made = timed(block.call, block.arguments, self.stopwatch)
+            block.check(made.outputs)
+            durations += made.durations_ns
             calls *= 2
         gc.collect()
         gc.freeze()
@@ -142,10 +143,15 @@ class TimingWorker:
         """Timed calls; of more than one the first, which finds the caches as another process left them, is not kept."""
         settling = int(calls > 1)
         block = self.ready.block(slice_name, round_number, calls + settling)
-        durations, outputs = timed(block.call, block.arguments, self.clock)
-        overhead, _ = timed(block.empty, block.arguments, self.clock)
-        block.check(outputs)
-        return {"ns": durations[settling:], "overhead_ns": overhead[settling:], "opening_ns": block.opening_ns}
+        made = timed(block.call, block.arguments, self.stopwatch)
+        empty = timed(block.empty, block.arguments, self.stopwatch)
+        block.check(made.outputs)
+        return {
+            "ns": made.durations_ns[settling:],
+            "waited_ns": made.waited_ns[settling:],
+            "overhead_ns": empty.durations_ns[settling:],
+            "opening_ns": block.opening_ns,
+        }
 
     def _look_ahead(self) -> dict[str, Any]:
         """Later frames that an answer waits for; a stream has answered before they come."""

@@ -69,22 +69,29 @@ class Timings:
 
     Attributes
     ----------
-    durations_s : slice -> ``[n]`` one for each steady-state call.
+    durations_s : slice -> ``[n]`` wall-clock time of each steady-state call.
+    waited_s : slice -> ``[n]`` the part of it in which the call had no core to run on; 0 where that is not counted.
     overhead_s : slice -> ``[n]`` the same for calls that do nothing, made beside them in the same loop.
     opening_s : ``[m]`` durations of ``open_stream``; empty where the adapter does not stream.
     facts : everything else.
     """
 
     durations_s: Mapping[str, FloatArray]
+    waited_s: Mapping[str, FloatArray]
     overhead_s: Mapping[str, FloatArray]
     opening_s: FloatArray
     facts: TimingFacts
+
+    def own_s(self, slice_name: str) -> FloatArray:
+        """Durations ``[n]`` without the waiting for a core: what the calls would last on a machine of their own."""
+        return self.durations_s[slice_name] - self.waited_s[slice_name]
 
     @cached_property
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """The arrays by name, as stored and digested."""
         return {
             **{f"durations_s/{name}": values for name, values in self.durations_s.items()},
+            **{f"waited_s/{name}": values for name, values in self.waited_s.items()},
             **{f"overhead_s/{name}": values for name, values in self.overhead_s.items()},
             "opening_s": self.opening_s,
         }
@@ -116,6 +123,7 @@ class Timings:
             told = json.loads((folder / FACTS_FILE).read_text())
             timings = cls(
                 _under("durations_s/", arrays),
+                _under("waited_s/", arrays),
                 _under("overhead_s/", arrays),
                 arrays["opening_s"],
                 TimingFacts(**told["facts"]),

@@ -69,6 +69,8 @@ def test_latency_carries_how_it_was_measured() -> None:
     assert details == pytest.approx(
         {
             "harness_overhead_us": 2.0,
+            "wall_p50_ms": 51.0,
+            "waited_percent": 0.0,
             "p95_ms": 96.0,
             "iqr_ms": 50.0,
             "end_to_end": 1.0,
@@ -76,6 +78,22 @@ def test_latency_carries_how_it_was_measured() -> None:
             "companions": 2.0,
         }
     )
+
+
+def test_waiting_for_a_core_is_taken_out_and_told() -> None:
+    kept = timings()
+    wall = {name: values + 0.004 for name, values in kept.durations_s.items()}
+    waited = {name: np.full(len(values), 0.004) for name, values in wall.items()}
+    found = by_name(Timings(wall, waited, kept.overhead_s, kept.opening_s, kept.facts))
+    online = found["latency_p50", ONLINE]
+    assert online.value == pytest.approx(15.0) and online.details["wall_p50_ms"] == pytest.approx(19.0)
+    assert online.details["waited_percent"] == pytest.approx(100 * 4 / 19)
+    assert str(online.reason).endswith("kept; a busy host: 21 % of the timed seconds went to other processes")
+    assert found["deadline_miss", "online 60 fps"].value == pytest.approx(100 * 34 / 101)
+    assert (
+        found["latency_p50", "offline L=60"].reason == "a busy host: 7 % of the timed seconds went to other processes"
+    )
+    assert found["latency_p50", "offline L=120"].reason is None
 
 
 def test_online_says_whether_it_streams() -> None:
@@ -135,7 +153,9 @@ def test_look_ahead_to_the_end_of_the_window_is_marked() -> None:
 
 def test_tails_of_few_calls_carry_a_warning() -> None:
     kept = timings()
-    few = Timings({name: np.full(8, 0.01) for name in kept.durations_s}, kept.overhead_s, kept.opening_s, kept.facts)
+    calls = {name: np.full(8, 0.01) for name in kept.durations_s}
+    waited = {name: np.zeros(8) for name in calls}
+    few = Timings(calls, waited, kept.overhead_s, kept.opening_s, kept.facts)
     found = by_name(few)
     assert found["latency_p99", ONLINE].reason == "of 8 calls only: too few to see one in 100"
     assert found["latency_p90", ONLINE].reason == "of 8 calls only: too few to see one in 10"

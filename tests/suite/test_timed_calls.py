@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.adapters.anchors import CopyContent, Noise, NoiseLow
+from bench.adapters.anchors import Noise, NoiseLow, PoseAdain
 from bench.adapters.base import Adapter, Description, Stream, Traits
 from bench.adapters.loading import AdapterSource
 from bench.adapters.oracles import RealTest
@@ -16,7 +16,8 @@ from bench.datasets.take import Take
 from bench.errors import BadConfig, BadOutput
 from bench.motion.clip import Clip
 from bench.motion.edit import crop
-from bench.suite.timed_calls import repeated, timed
+from bench.suite.stopwatch import HostStopwatch, timed
+from bench.suite.timed_calls import repeated
 from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan, offline
 from bench.suite.timing_worker import TimingWorker, Unsupported, failure, loaded_adapter, memory_mb
 from tests.motion.factory import random_clip
@@ -98,8 +99,8 @@ def test_every_call_is_timed_by_itself_and_without_garbage_collection(clock: Tic
         clock.ns += milliseconds * 1_000_000
         return milliseconds
 
-    durations, outputs = timed(call, [(1,), (5,), (2,)], clock)
-    assert durations == [1_000_000, 5_000_000, 2_000_000] and outputs == [1, 5, 2]
+    calls = timed(call, [(1,), (5,), (2,)], clock)
+    assert calls.durations_ns == [1_000_000, 5_000_000, 2_000_000] and calls.outputs == [1, 5, 2]
     assert enabled == [False] * 3 and gc.isenabled()
 
 
@@ -109,13 +110,36 @@ def test_garbage_collection_is_back_after_a_failing_call(clock: Ticker) -> None:
     assert gc.isenabled()
 
 
+def test_waiting_for_a_core_is_kept_beside_the_duration(clock: Ticker) -> None:
+    def call(milliseconds: int, waited: int) -> None:
+        clock.ns += milliseconds * 1_000_000
+        clock.waited += waited * 1_000_000
+
+    calls = timed(call, [(5, 2), (5, 0), (5, -1), (5, 7)], clock)
+    assert calls.durations_ns == [5_000_000] * 4
+    # More waiting than the call lasted fell outside of it; less than none is what helper threads of its own computed.
+    assert calls.waited_ns == [2_000_000, 0, 0, 0]
+
+
+def test_the_clocks_of_this_machine_go_forward() -> None:
+    stopwatch = HostStopwatch()
+    start = stopwatch.now_ns()
+    assert 0 < stopwatch.now_ns() - start < 10**9
+    assert isinstance(stopwatch.waited_ns(), int)
+
+
+def test_a_system_that_does_not_count_waiting_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.suite.stopwatch.SCHEDULER_STATISTICS", "/nowhere")
+    stopwatch = HostStopwatch()
+    assert (stopwatch.knows_waiting, stopwatch.waited_ns()) == (False, 0)
+
+
 def test_offline_calls_have_the_length_and_differ(tmp_path: Path, clock: Ticker) -> None:
     adapter = Slow(clock)
     calls = calls_of(tmp_path, adapter, clock)
     assert calls.slices == ("offline L=20", "offline L=30", "online")
     block = calls.block(offline(30), 1, 4)
-    _, outputs = timed(block.call, block.arguments, clock)
-    block.check(outputs)
+    block.check(timed(block.call, block.arguments, clock).outputs)
     clips = [content.clip for content, _, _ in adapter.seen]
     assert [clip.n_frames for clip in clips] == [30] * 4
     assert len({clip.rotations_wxyz.tobytes() for clip in clips}) == 4
@@ -123,7 +147,7 @@ def test_offline_calls_have_the_length_and_differ(tmp_path: Path, clock: Ticker)
 
 
 def test_inputs_are_the_same_for_every_adapter(tmp_path: Path, clock: Ticker) -> None:
-    ours, theirs = (calls_of(tmp_path, adapter, clock) for adapter in (CopyContent(), NoiseLow()))
+    ours, theirs = (calls_of(tmp_path, adapter, clock) for adapter in (PoseAdain(), NoiseLow()))
     for slice_name in ours.slices:
         for one, other in zip(
             ours.block(slice_name, 2, 3).arguments, theirs.block(slice_name, 2, 3).arguments, strict=True
@@ -159,10 +183,10 @@ def test_a_stream_has_seen_the_past_frames_and_goes_on(tmp_path: Path, clock: Ti
     calls = calls_of(tmp_path, adapter, clock)
     assert calls.slices == (ONLINE,)
     block = calls.block(ONLINE, 1, 3)
-    durations, outputs = timed(block.call, block.arguments, clock)
-    block.check(outputs)
+    made = timed(block.call, block.arguments, clock)
+    block.check(made.outputs)
     ((stream, label),) = adapter.opened
-    assert (durations, block.opening_ns, label) == ([2_000_000] * 3, 9_000_000, "run")
+    assert (made.durations_ns, block.opening_ns, label) == ([2_000_000] * 3, 9_000_000, "run")
     first = SMALL.calls
     source = calls.inputs[1].content.clip
     np.testing.assert_array_equal(np.stack(stream.roots), source.root_xyz_m[first : first + 11])
@@ -182,10 +206,10 @@ def test_a_method_of_one_length_gets_windows_of_that_length(tmp_path: Path, cloc
     adapter = OneLength(clock)
     calls = calls_of(tmp_path, adapter, clock)
     block = calls.block(offline(30), 0, 1)
-    durations, outputs = timed(block.call, block.arguments, clock)
-    block.check(outputs)
+    made = timed(block.call, block.arguments, clock)
+    block.check(made.outputs)
     assert [content.clip.n_frames for content, _, _ in adapter.seen] == [16, 16]
-    assert durations == [3_000_000 + 4_000_000]
+    assert made.durations_ns == [3_000_000 + 4_000_000]
     last = adapter.seen[1][0].clip
     np.testing.assert_array_equal(last.rotations_wxyz[13], last.rotations_wxyz[15])
 
@@ -229,6 +253,7 @@ def test_the_first_call_of_a_block_is_not_kept(tmp_path: Path, clock: Ticker) ->
     block = {"do": "block", "slice": offline(20), "round": 0}
     assert worker.answer({**block, "calls": 2}) == {
         "ns": [4_000_000, 5_000_000],
+        "waited_ns": [0, 0],
         "overhead_ns": [0, 0],
         "opening_ns": None,
     }

@@ -10,7 +10,7 @@ from bench.adapters.loading import AdapterSource
 from bench.datasets.pack import write_pack
 from bench.datasets.take import Take
 from bench.protocols.base import Task
-from bench.suite.timed_calls import Calls, Clock, timed_inputs
+from bench.suite.timed_calls import Calls, timed_inputs
 from bench.suite.timing_plan import TimingJob, TimingPlan
 from tests.motion.factory import random_clip
 
@@ -57,16 +57,19 @@ def written(folder: Path, name: str, transfer: str, rest: str = "") -> AdapterSo
 
 
 class Ticker:
-    """A clock that stands still unless it is moved."""
+    """Clocks that stand still unless they are moved."""
 
     def __init__(self) -> None:
-        self.ns = 0
+        self.ns = self.waited = 0
 
-    def __call__(self) -> int:
+    def now_ns(self) -> int:
         return self.ns
 
+    def waited_ns(self) -> int:
+        return self.waited
 
-def calls_of(folder: Path, adapter: Adapter, clock: Clock, plan: TimingPlan = SMALL) -> Calls:
+
+def calls_of(folder: Path, adapter: Adapter, clock: Ticker, plan: TimingPlan = SMALL) -> Calls:
     """The calls of an adapter on the small plan."""
     world(folder)
     job = job_of(folder, AdapterSource("mine"))

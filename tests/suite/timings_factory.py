@@ -44,4 +44,5 @@ def timings(facts: TimingFacts = FACTS) -> Timings:
     if not facts.transfers:
         durations = {ONLINE: durations[ONLINE]}
     opening = np.array([0.003, 0.001, 0.002]) if facts.streams else np.zeros(0)
-    return Timings(durations, {name: np.full(101, 2e-6) for name in durations}, opening, facts)
+    waited = {name: np.zeros(101) for name in durations}
+    return Timings(durations, waited, {name: np.full(101, 2e-6) for name in durations}, opening, facts)

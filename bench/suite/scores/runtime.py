@@ -2,7 +2,9 @@
 
 Slices: ``offline L=60`` and so on are calls on whole clips; ``online`` is one frame at a time, by the adapter's stream
 where it has one (``streaming`` is 1 in the details), else by a call on the frame and those before it, of whose answer
-the last frame is kept. The harness's own share of a call is measured beside it and not subtracted.
+the last frame is kept. Durations are wall-clock time less what the call spent waiting for a core that other processes
+had (``waited_percent``); ``wall_p50_ms`` is the median with it. The harness's own part of a call is measured beside it
+and not subtracted.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ from reports.records import Measurement
 
 PER_CALL = ("latency_p50", "latency_p90", "latency_p99", "latency_max", "frames_per_second", "real_time_factor")
 ALL = "all"
+BUSY_PERCENT = 5.0
+"""Share of the timed seconds without a core above which a row says that the host was busy."""
 NO_TRANSFER = "the adapter streams only: it has no call on whole clips"
 NOT_DESCRIBED = "the adapter does not describe itself"
 NO_DESIGN = "the adapter declares no input length it was designed for"
@@ -46,7 +50,7 @@ def runtime_measurements(timings: Timings, deadline_fps: Sequence[float] = DEADL
             found += _call_measurements(timings, slice_name)
         else:
             found += [measure(name, slice_name, np.nan, 0, reason=NO_TRANSFER) for name in PER_CALL]
-    durations_s = timings.durations_s[ONLINE]
+    durations_s = timings.own_s(ONLINE)
     found += [
         measure(
             "deadline_miss",
@@ -62,12 +66,18 @@ def runtime_measurements(timings: Timings, deadline_fps: Sequence[float] = DEADL
 
 
 def _call_measurements(timings: Timings, slice_name: str) -> list[Measurement]:
-    facts, durations_s = timings.facts, timings.durations_s[slice_name]
+    facts, durations_s, wall_s = timings.facts, timings.own_s(slice_name), timings.durations_s[slice_name]
+    waited_percent = 100.0 * float(1.0 - durations_s.sum() / wall_s.sum())
     frames, n = facts.frames_per_call[slice_name], len(durations_s)
     statistics = duration_statistics(durations_s)
-    reason = _online_reason(facts) if slice_name == ONLINE else ""
+    reasons = [_online_reason(facts)] if slice_name == ONLINE else []
+    if waited_percent > BUSY_PERCENT:
+        reasons.append(f"a busy host: {waited_percent:.0f} % of the timed seconds went to other processes")
+    reason = "; ".join(filter(None, reasons))
     details = {
         "harness_overhead_us": 1e6 * float(np.median(timings.overhead_s[slice_name])),
+        "wall_p50_ms": 1e3 * float(np.median(wall_s)),
+        "waited_percent": waited_percent,
         "p95_ms": 1e3 * statistics.p95_s,
         "iqr_ms": 1e3 * statistics.iqr_s,
         "end_to_end": 1.0,
