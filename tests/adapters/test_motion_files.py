@@ -6,11 +6,13 @@ import os
 import tracemalloc
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from bench.adapters.motion_files import motion_of, npz_bytes, parse_npz, read_bounded, read_motion
 from bench.errors import BadFile, BenchError
@@ -36,10 +38,24 @@ def zipped(members: dict[str, bytes], compression: int = zipfile.ZIP_STORED) -> 
     return buffer.getvalue()
 
 
-def test_arrays_survive() -> None:
-    arrays = parse_npz(GOOD, NAMES, "x")
+def saved(rotations_wxyz: NDArray[Any]) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, rotations_wxyz=rotations_wxyz, root_xyz_m=CLIP.root_xyz_m)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize("content", [GOOD, saved(CLIP.rotations_wxyz)], ids=["ours", "numpy"])
+def test_arrays_survive(content: bytes) -> None:
+    arrays = parse_npz(content, NAMES, "x")
     np.testing.assert_array_equal(arrays["rotations_wxyz"], CLIP.rotations_wxyz)
     np.testing.assert_array_equal(arrays["root_xyz_m"], CLIP.root_xyz_m)
+
+
+def test_numpy_reads_what_is_written() -> None:
+    with np.load(io.BytesIO(GOOD), allow_pickle=False) as file:
+        np.testing.assert_array_equal(file["rotations_wxyz"], CLIP.rotations_wxyz)
+    with np.load(io.BytesIO(npz_bytes({"fps": np.array(30.0)})), allow_pickle=False) as file:
+        assert file["fps"].shape == ()
 
 
 @pytest.mark.parametrize("dtype", ["<f4", ">f4", ">f8"])
@@ -50,12 +66,6 @@ def test_other_floats_orders_and_compression_are_read(dtype: str, order: str) ->
     np.testing.assert_allclose(parse_npz(buffer.getvalue(), ("a",), "x")["a"], CLIP.root_xyz_m, rtol=1e-6)
 
 
-def pickled() -> bytes:
-    buffer = io.BytesIO()
-    np.savez(buffer, rotations_wxyz=np.array([{"a": 1}], dtype=object), root_xyz_m=CLIP.root_xyz_m)
-    return buffer.getvalue()
-
-
 @pytest.mark.parametrize(
     ("content", "match"),
     [
@@ -63,8 +73,8 @@ def pickled() -> bytes:
         (b"PK\x03\x04", "is not a readable .npz"),
         (GOOD[:-30], "is not a readable .npz"),
         (npz_bytes({"root_xyz_m": CLIP.root_xyz_m}), "no array 'rotations_wxyz'"),
-        (pickled(), "is not a plain array of float32 or float64.*need pickle"),
-        (npz_bytes({name: np.zeros(3, dtype=np.int64) for name in NAMES}), "is not a plain array"),
+        (saved(np.array([{"a": 1}], dtype=object)), "is not a plain array of float32 or float64.*need pickle"),
+        (saved(np.zeros(3, dtype=np.int64)), "is not a plain array"),
         (zipped({f"{name}.npy": b"hello" for name in NAMES}), "is not an .npy array"),
         (zipped({f"{name}.npy": npy(HEADER.format(shape="(10000000, 21, 4)")) for name in NAMES}), "claims shape"),
         (zipped({f"{name}.npy": npy("(" * 5000) for name in NAMES}), "is not a plain array"),
