@@ -59,25 +59,40 @@ _RECOGNITION = (
     ColumnChoice("cra", "CRA"),
     ColumnChoice("sra", "SRA"),
 )
-_GESTURE = ("intra", "all", "inter")
 
 
-def _gesture(slices: tuple[str, ...]) -> tuple[ColumnChoice, ...]:
+def _hands(slices: tuple[str, ...], kind: str, first: bool = False) -> tuple[ColumnChoice, ...]:
+    """Mean, worst and worst quarter of an error of the hands, ``content`` or ``style``."""
     return (
-        ColumnChoice("gesture_error", "content + style", slices=slices, interval=True),
-        ColumnChoice("gesture_error[truth]", "to the true answer", slices=slices),
-        ColumnChoice("content_error", "content error", slices=slices),
-        ColumnChoice("content_error_worst", "content, worst", slices=slices),
-        ColumnChoice("content_error_worst_quarter", "content, worst 25 %", slices=slices),
-        ColumnChoice("style_error", "style error", slices=slices),
-        ColumnChoice("style_error_worst", "style, worst", slices=slices),
-        ColumnChoice("style_error_worst_quarter", "style, worst 25 %", slices=slices),
-        ColumnChoice("style_error[1.07s]", "style error, 1.07 s", "details", slices),
-        ColumnChoice("style_error[4.27s]", "style error, 4.27 s", "details", slices),
-        ColumnChoice("content_error[world]", "content error, world frame", "details", slices),
-        ColumnChoice("style_error[world]", "style error, world frame", "details", slices),
-        ColumnChoice("content_error[fastdtw]", "content error, FastDTW", "details", slices),
+        ColumnChoice(f"{kind}_error", f"{kind} error", slices=slices, interval=first),
+        ColumnChoice(f"{kind}_error_worst", f"{kind}, worst", slices=slices),
+        ColumnChoice(f"{kind}_error_worst_quarter", f"{kind}, worst 25 %", slices=slices),
     )
+
+
+def _more_hands(slices: tuple[str, ...]) -> tuple[ColumnChoice, ...]:
+    titles = {
+        "style_error[1.07s]": "style error, 1.07 s",
+        "style_error[4.27s]": "style error, 4.27 s",
+        "content_error[world]": "content error, world frame",
+        "style_error[world]": "style error, world frame",
+        "content_error[fastdtw]": "content error, FastDTW",
+    }
+    return tuple(ColumnChoice(metric, title, "details", slices) for metric, title in titles.items())
+
+
+_GESTURE = (
+    ColumnChoice("gesture_error", "content + style", slices=("intra",), interval=True),
+    ColumnChoice("gesture_error[truth]", "to the true answer", slices=("intra",)),
+    *_hands(("intra",), "content"),
+    *_hands(("intra",), "style"),
+    ColumnChoice("gesture_error", "content + style, other scenario", "details", ("inter",)),
+    *_more_hands(("intra",)),
+)
+
+
+def _kuriyama(slices: tuple[str, ...]) -> tuple[ColumnChoice, ...]:
+    return (*_hands(slices, "style", first=True), *_hands(slices, "content"), *_more_hands(slices))
 
 
 _PARK = (
@@ -132,9 +147,11 @@ COLUMNS: dict[str, tuple[ColumnChoice, ...]] = {
         ColumnChoice("bone_drift", "bone drift", slices=_ALL),
     ),
     "parts": (*_LEAKS, ColumnChoice("leak_ratio[position]", "leak of positions", slices=("all",)), *_MOVES),
-    "gesture": _gesture(_GESTURE),
-    "kuriyama2022/table3": _gesture(("inter",)),
-    "kuriyama2022/table4": _gesture(("all",)),
+    "gesture": _GESTURE,
+    "kuriyama2022/table1": _kuriyama(("intra",)),
+    "kuriyama2022/table2": _kuriyama(("intra",)),
+    "kuriyama2022/table3": _kuriyama(("inter",)),
+    "kuriyama2022/table4": _kuriyama(("all",)),
     "interpolation": (
         ColumnChoice("monotonicity", "monotonicity", slices=("all",), interval=True),
         ColumnChoice("evenness", "evenness", slices=("all",)),

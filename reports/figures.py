@@ -48,7 +48,8 @@ STYLE: dict[Any, Any] = {
 CAPTION_COLUMNS = 120
 
 
-def _style() -> AbstractContextManager[None]:
+def styled() -> AbstractContextManager[None]:
+    """The look of all figures, whatever the reader's own settings are."""
     return mpl.rc_context({**mpl.rcParamsDefault, **STYLE, "backend": mpl.rcParams["backend"]})
 
 
@@ -67,7 +68,7 @@ def recognition_scatter(table: Table) -> Figure:
     rows = [row for row in table.rows if _value(row, content) is not None and _value(row, style) is not None]
     if not rows:
         raise BadRecord(f"{table.title}: no row has content and style recognition to draw")
-    with _style():
+    with styled():
         figure, axes = _canvas(8.2, 7.0)
         _iso_hint(axes)
         points = np.array([[_value(row, content), _value(row, style)] for row in rows], dtype=np.float64)
@@ -106,7 +107,7 @@ def interval_bars(table: Table, metric: str | None = None) -> Figure:
     rows = [row for row in table.rows if _value(row, column) is not None]
     if not rows:
         raise BadRecord(f"{table.title}: no row has a value of {column.title} to draw")
-    with _style():
+    with styled():
         figure, axes = _canvas(7.6, 1.9 + 0.25 * len(rows))
         for place, row in enumerate(rows):
             _draw_interval(axes, place, row, row.estimates[column.key])
@@ -141,7 +142,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     if form not in metadata:
         raise ValueError(f"{path}: a figure is saved as .png, .pdf or .svg, not {path.suffix or 'without a suffix'}")
     buffer = io.BytesIO()
-    with _style():
+    with styled():
         figure.savefig(buffer, format=form, metadata=metadata[form])
     write_bytes_atomically(path, buffer.getvalue())
 

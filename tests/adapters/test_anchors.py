@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +71,7 @@ NORMAL = [adapter for adapter in ADAPTERS.values() if not issubclass(adapter, Or
 def answers(adapter: Adapter, source: Take, style: Take) -> dict[str, Clip]:
     """What an adapter answers to each capability it has, with half of the style where a share is asked for."""
     half = [(Take(source.clip, style=source.style), 0.5), (style, 0.5)]
-    calls = {
+    calls: dict[str, Callable[[], Clip]] = {
         "transfers": lambda: adapter.transfer(source, style, rng=rng()),
         "samples": lambda: adapter.sample(source, str(style.style), rng=rng()),
         "interpolates": lambda: adapter.interpolate(source, half, rng=rng()),

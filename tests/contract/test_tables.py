@@ -7,14 +7,17 @@ from pathlib import Path
 import pytest
 
 from bench.adapters import ADAPTERS
-from bench.adapters.base import Adapter
+from bench.adapters.base import CAPABILITIES, Adapter
 from bench.adapters.oracles import Oracle
 from bench.datasets.table import DATASETS
 from bench.metrics import METRICS
 from bench.metrics.catalogue import Metric
 from bench.protocols import PROTOCOLS
 from bench.protocols.base import Protocol
+from bench.suite.answering import ANSWERS
+from bench.suite.request import OWN_PROTOCOLS
 from bench.suite.scores import SCORES
+from reports.columns import columns_of
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -27,16 +30,39 @@ def test_metric_is_documented(metric: Metric) -> None:
     assert f"`{metric.name}`" in page
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=lambda protocol: protocol.protocol_id)
+@pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=lambda protocol: protocol.label)
 def test_protocol_names_only_known_metrics(protocol: Protocol) -> None:
-    assert set(protocol.metrics) <= set(METRICS)
+    named = (*protocol.metrics, *protocol.truth_metrics)
+    assert set(named) <= set(METRICS)
     assert protocol.primary[0] in protocol.metrics
-    assert {"quick", "standard"} <= set(protocol.n_samples)
+    assert {"smoke", "quick", "standard"} <= set(protocol.n_samples)
+    assert protocol.summary and protocol.facts
+    assert protocol.needs in CAPABILITIES
+    if protocol.track != "runtime":
+        assert set(named) <= set(SCORES)
+        assert protocol.track in ANSWERS
 
 
-@pytest.mark.parametrize("name", [m for p in PROTOCOLS.values() if p.track == "transfer" for m in p.metrics])
-def test_transfer_metric_has_a_score(name: str) -> None:
-    assert name in SCORES
+@pytest.mark.parametrize("metric", METRICS)
+def test_every_metric_is_computed_somewhere(metric: str) -> None:
+    assert any(metric in (*protocol.metrics, *protocol.truth_metrics) for protocol in PROTOCOLS.values())
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=lambda protocol: protocol.label)
+def test_every_protocol_has_columns_and_its_primary_leads(protocol: Protocol) -> None:
+    columns = columns_of(protocol.track, protocol.name, protocol.condition)
+    assert columns[0].metric == protocol.primary[0]
+    known = {*METRICS}
+    assert {column.metric for column in columns} <= known
+    titles = [column.title for column in columns]
+    assert len(set(titles)) == len(titles)
+
+
+@pytest.mark.parametrize("track", sorted({protocol.track for protocol in PROTOCOLS.values()}))
+def test_every_track_has_rows_to_read_it_against(track: str) -> None:
+    protocol = OWN_PROTOCOLS[track]
+    rows = [a for a in ADAPTERS.values() if protocol.needs in a.capabilities() or track in getattr(a, "tracks", ())]
+    assert len(rows) >= 2
 
 
 @pytest.mark.parametrize("adapter", ADAPTERS.values(), ids=lambda adapter: adapter.name)

@@ -44,7 +44,7 @@ def joints_above(name: str, threshold: float, row: PlainRow, basis: Basis) -> Sc
         rows = basis.slices[f"part={part}"]
         mean = change[rows].mean(axis=0)
         above = locality.joints_above(mean, threshold, _virtual(row))
-        details = {f"{joint} {CANONICAL_NAMES[joint]}": float(mean[joint]) for joint in above}
+        details = {f"{joint:02d} {CANONICAL_NAMES[joint]}": float(mean[joint]) for joint in above}
         measurements.append(measure(name, f"part={part}", float(len(above)), int(rows.sum()), details=details))
     return Scored(tuple(measurements))
 
@@ -113,6 +113,6 @@ def _displacement(name: str, change: FloatArray, row: PlainRow, basis: Basis) ->
         rows = basis.slices[f"part={part}"]
         mean = change[rows].mean(axis=0)
         inside = [joint for joint in PARTS[part] if joint in row.joints]
-        details = {CANONICAL_NAMES[joint]: float(mean[joint]) for joint in row.joints}
+        details = {f"{joint:02d} {CANONICAL_NAMES[joint]}": float(mean[joint]) for joint in row.joints}
         measurements.append(measure(name, f"part={part}", float(mean[inside].mean()), int(rows.sum()), details=details))
     return Scored(tuple(measurements))
