@@ -27,7 +27,6 @@ from bench.motion.clip import Clip
 from bench.motion.skeleton import CANONICAL_NAMES, CANONICAL_PARENTS
 
 KEPT_STYLES = 256
-STEP_TIMEOUT_S = 10.0
 
 
 def external_adapter(toml_file: Path) -> type[External]:
@@ -342,7 +341,7 @@ class OutsideStream:
         """
         turns, root = np.asarray(rotations_wxyz), np.asarray(root_xyz_m)
         fields = {"stream": self.number, "rotations_wxyz": turns.tolist(), "root_xyz_m": root.tolist()}
-        answer = self.session.request("step", fields, STEP_TIMEOUT_S)
+        answer = self.session.request("step", fields, self.session.program.timeouts.task_s)
         try:
             return (
                 finite_array(answer.get("rotations_wxyz", ()), "rotations_wxyz", turns.shape),

@@ -62,7 +62,7 @@ CALLS = {
     "describes": ("describe",),
 }
 ARRAYS = ("rotations_wxyz", "root_xyz_m", "offsets_m")
-KEPT_MOTIONS = 256
+KEPT_MOTIONS, OPEN_STREAMS = 256, 16
 CENTIMETRE_M = 0.01
 
 
@@ -323,6 +323,8 @@ class Worker:
     def _on_open_stream(self, request: dict[str, Any]) -> dict[str, Any]:
         style = self._motion(request["style"])
         stream = self._call("open_stream", style, seed=request["seed"], content_label=request["content_label"])
+        while len(self.streams) >= OPEN_STREAMS:
+            del self.streams[min(self.streams)]
         self.streams[request["stream"]] = getattr(stream, "step", stream)
         return {}
 
@@ -330,10 +332,6 @@ class Worker:
         turns, root = (numpy.array(request[name]) for name in ("rotations_wxyz", "root_xyz_m"))
         turns, root = self.streams[request["stream"]](turns, root)
         return {"rotations_wxyz": _as_array(turns).tolist(), "root_xyz_m": _as_array(root).tolist()}
-
-    def _on_close_stream(self, request: dict[str, Any]) -> dict[str, Any]:
-        self.streams.pop(request["stream"], None)
-        return {}
 
     def _on_describe(self, request: dict[str, Any]) -> dict[str, Any]:
         return {"description": self.module.describe()}

@@ -34,7 +34,7 @@ FORMAT = 1
 TRACKS = ("transfer", "latent", "gesture", "parts", "interpolation")
 """Tracks whose answers are motions of the content's length. The others measure a running method."""
 MANIFEST, SUBMISSION, ANSWERS = "manifest.json", "submission.toml", "answers"
-MAX_MANIFEST_BYTES = 8 << 20
+MANIFEST_BYTES, ROW_BYTES = 65536, 1024
 OTHER_SUFFIX = {".bvh": ".npz", ".npz": ".bvh"}
 
 SUBMISSION_TEXT = """\
@@ -303,8 +303,9 @@ def _answer_files(folder: Path, setting: Setting) -> list[tuple[Task, Clip, str]
 def _answer_names(folder: Path, setting: Setting) -> dict[str, str]:
     """Sample id -> path of the answer inside the folder, as the manifest says."""
     where = str(folder / MANIFEST)
+    limit = MANIFEST_BYTES + ROW_BYTES * (len(setting.tasks) + len(setting.fit_take_ids))
     try:
-        manifest = json.loads(read_bounded(folder, MANIFEST, MAX_MANIFEST_BYTES))
+        manifest = json.loads(read_bounded(folder, MANIFEST, limit))
     except (ValueError, RecursionError):
         raise BadFile("is not JSON", where=where, remedy="export the tasks again") from None
     if (
