@@ -194,8 +194,12 @@ class Channel:
         os.close(empty)
         os.dup2(2, 1)
         self.lock = threading.Lock()
+        self.owner = os.getpid()
 
     def send(self, message: dict[str, Any]) -> None:
+        if os.getpid() != self.owner:
+            # A fork of the user's code came back as if it were the worker.
+            os._exit(1)
         data = (json.dumps(message, allow_nan=False) + "\n").encode("utf-8")
         with self.lock:
             while data:

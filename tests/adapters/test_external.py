@@ -123,6 +123,25 @@ def test_prints_go_to_the_log_and_not_into_the_protocol(folder: Path, capfd: pyt
         assert line in log
 
 
+def test_forks_and_pools_do_not_answer_for_the_worker(folder: Path, shared_memory: Path) -> None:
+    code = """
+    import multiprocessing, os
+    def transfer(content, style):
+        with multiprocessing.Pool(2) as pool:
+            assert pool.map(abs, [-1, -2]) == [1, 2]
+        os.fork()
+        print("twice")
+        return content
+    """
+    method = with_worker(folder, code)()
+    for seed in range(3):
+        content = content_take(seed=seed)
+        answer = method.transfer(content, style_take(), rng=rng())
+        np.testing.assert_array_equal(answer.root_xyz_m, content.clip.root_xyz_m)
+    method.close()
+    check_nothing_is_left(folder, shared_memory)
+
+
 def test_answers_depend_on_the_seed_alone(folder: Path) -> None:
     code = """
     import random, numpy
