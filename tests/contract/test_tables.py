@@ -79,3 +79,8 @@ def test_dataset_names_its_licence_and_source(name: str) -> None:
     entry = DATASETS[name]
     assert entry.licence and entry.citation and entry.summary
     assert entry.how_to_get or not entry.needs_path
+
+
+@pytest.mark.parametrize("label", PROTOCOLS)
+def test_protocol_is_documented(label: str) -> None:
+    assert f"`{label}`" in (DOCS / "protocols.md").read_text(encoding="utf-8")
