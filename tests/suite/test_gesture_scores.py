@@ -11,7 +11,6 @@ from bench.datasets.joined import joined_take
 from bench.datasets.pack import Pack, write_pack
 from bench.datasets.take import Take
 from bench.errors import BadInput
-from bench.metrics import METRICS
 from bench.metrics.gesture import (
     content_error_components,
     hand_trajectories,
@@ -190,8 +189,7 @@ def test_details_say_which_time_warping_and_which_segments(basis: Basis) -> None
     )  # fmt: skip
 
 
-def test_errors_to_the_truth(basis: Basis, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METRICS, "gesture_error[truth]", METRICS["gesture_error"])
+def test_errors_to_the_truth(basis: Basis) -> None:
     known = replace(basis, truth=LIFTED.motions)
     scored = gesture_error_to_truth(LIFTED, known)
     assert found(scored, "all").details["style_error"] == 0.0
