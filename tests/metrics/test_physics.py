@@ -68,6 +68,7 @@ def test_jerk_ratio_is_one_on_itself_and_grows_with_noise() -> None:
 def test_ratio_by_hand_and_per_content() -> None:
     assert ratio_to_reference([1.0, 3.0], [4.0]) == 2.0
     assert ratio_to_reference([4.0], [1.0, 3.0]) == 0.5
+    assert ratio_to_reference([0.25, 0.25], [0.5]) == 2.0
     table = ratio_per_content([1.0, 3.0, 5.0], [0, 0, 1], [4.0, 10.0, 7.0], [0, 1, 2])
     assert table == {0: 2.0, 1: 2.0}
 
@@ -102,6 +103,15 @@ def test_time_correlation_falls_with_noise_and_is_nan_on_a_frozen_clip() -> None
     assert np.isnan(time_correlation(motion, frozen)).all()
 
 
+def test_time_correlation_needs_two_frames_and_a_micrometre_of_movement() -> None:
+    motion = some_motion()
+    np.testing.assert_allclose(time_correlation(motion[:, :2], motion[:, :2]), 1.0)
+    wave = np.zeros((1, 64, 2, 3))
+    wave[0, :, 1, 1] = np.sin(np.linspace(0.0, 6.0, 64))
+    np.testing.assert_allclose(time_correlation(wave, 1e-5 * wave), 1.0)
+    assert np.isnan(time_correlation(wave, 1e-7 * wave)).all() and np.isnan(time_correlation(1e-7 * wave, wave)).all()
+
+
 def chain(lengths: FloatArray) -> FloatArray:
     """A straight chain along y: bone ``lengths`` ``[T, J - 1]`` give positions ``[1, T, J, 3]``."""
     positions = np.zeros((1, len(lengths), lengths.shape[1] + 1, 3))
@@ -134,6 +144,12 @@ def test_bone_drift_ignores_motion_scale_and_tiny_bones_and_grows_with_stretch()
     np.testing.assert_allclose(scaled, 5.0)
 
 
+def test_a_bone_of_one_millimetre_counts() -> None:
+    reference = np.array([0.0, 1.0, 0.001])
+    np.testing.assert_allclose(bone_drift(chain(np.array([[1.0, 0.002]])), (-1, 0, 1), reference), 50.0)
+    np.testing.assert_allclose(bone_drift(chain(np.array([[1.0, 0.002]])), (-1, 0, 1), 0.999 * reference), 100 / 999)
+
+
 def sliding_foot(speed_m_s: float, height_m: float = 0.0, n_frames: int = 31) -> FloatArray:
     """Joint 0 a root overhead, joint 1 a foot that slides along x at ``height_m``, joint 2 one that stands on 0."""
     positions = np.zeros((1, n_frames, 3, 3))
@@ -158,6 +174,15 @@ def test_contact_holds_between_its_two_heights() -> None:
     np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 30.0 * 19 / (19 + 39))
 
 
+def test_contact_begins_under_three_and_ends_over_five_centimetres() -> None:
+    positions = sliding_foot(0.3, height_m=0.03, n_frames=40)
+    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 0.0)
+    positions[0, :, 1, 1] = np.repeat([0.0, 0.05], 20)
+    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 15.0)
+    positions[0, 20:, 1, 1] = 0.051
+    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 30.0 * 19 / (19 + 39))
+
+
 def test_no_contact_is_nan() -> None:
     positions = sliding_foot(0.3, n_frames=2)
     positions[0, :, 1, 1] = [0.0, 1.0]
@@ -171,6 +196,20 @@ def test_skate_gmd_by_hand() -> None:
     np.testing.assert_allclose(skate_gmd(sliding_foot(1.0, height_m=0.06), FPS, [1, 2]), 0.0)
     # At 0.6 m/s the averages at the ends are 0.36 and 0.48: two steps at each end do not count.
     np.testing.assert_allclose(skate_gmd(sliding_foot(0.6), FPS, [1, 2]), 100.0 * 26 / 30)
+
+
+def test_skate_gmd_at_its_thresholds() -> None:
+    """A frame skates over 0.5 m/s, now and on average over 5 (0.5 at the ends), under 5 cm now and before."""
+    for speeds, share in (([1.0, 1.0, 0.5, 1.0, 1.0], 40.0), ([0.0, 0.5, 1.0, 0.5, 0.5], 0.0)):
+        positions = np.zeros((1, 6, 1, 3))
+        positions[0, 1:, 0, 0] = np.cumsum(speeds)
+        np.testing.assert_allclose(skate_gmd(positions, 1.0, [0]), share)
+    diagonal = sliding_foot(0.4)
+    diagonal[0, :, 1, 2] = diagonal[0, :, 1, 0]
+    np.testing.assert_allclose(skate_gmd(diagonal, FPS, [1, 2]), 100.0 * 26 / 30)
+    positions = sliding_foot(1.0)
+    positions[0, 10:, 1, 1] = 0.05
+    np.testing.assert_allclose(skate_gmd(positions, FPS, [1]), 100.0 * 9 / 30)
 
 
 def test_floor_penetration_and_float() -> None:
