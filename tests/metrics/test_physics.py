@@ -179,6 +179,9 @@ def test_contact_begins_under_three_and_ends_over_five_centimetres() -> None:
     np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 0.0)
     positions[0, :, 1, 1] = np.repeat([0.0, 0.05], 20)
     np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 15.0)
+    landing = sliding_foot(0.0)
+    landing[0, 0, 1] = -1.0, 0.2, 0.0
+    np.testing.assert_allclose(foot_skate(landing, FPS, [1]), 0.0)
     positions[0, 20:, 1, 1] = 0.051
     np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 30.0 * 19 / (19 + 39))
 
