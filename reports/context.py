@@ -16,7 +16,28 @@ def context(table: Table) -> tuple[str, ...]:
     said += ["; ".join(chance for chance in chances if chance)]
     real = _range(table, "joint_recognition_ratio", "real_disjoint_percent")
     said += [f"of real: 1 is the joint recognition of real disjoint motion, {real} %" if real else ""]
+    said += [_clock(table), _trials(table)]
     return tuple(f"{sentence}." for sentence in said if sentence)
+
+
+def _clock(table: Table) -> str:
+    """What stands between the clock and the method, for tables of durations; empty for others."""
+    overhead = _range(table, "latency_p50", "harness_overhead_us", "us")
+    if not overhead:
+        return ""
+    threads = _range(table, "latency_p50", "threads", "count")
+    machines = sorted({record.provenance.gpu or record.provenance.cpu for row in table.rows for record in row.row.ok})
+    return f"The harness itself takes {overhead} us of a call; threads: {threads}; on {', '.join(machines)}"
+
+
+def _trials(table: Table) -> str:
+    """What a mean over trials was drawn from; empty for tables without."""
+    for column in table.columns_of("main"):
+        pool = _range(table, column.metric, "pool", "count")
+        if pool:
+            n, samples = _range(table, column.metric, "trials", "count"), table.n
+            return f"{column.title}: mean of {n} trials of {samples} samples out of a pool of {pool}"
+    return ""
 
 
 def judge_summary(judges: Sequence[JudgeFacts]) -> str:
@@ -51,8 +72,8 @@ def _chance(table: Table, column: Column) -> str:
     return f"{column.title}: {said}" if said else ""
 
 
-def _range(table: Table, metric: str, detail: str) -> str:
-    """A percentage in the details of a main column, over all rows; empty where there is none."""
+def _range(table: Table, metric: str, detail: str, unit: str = "%") -> str:
+    """A number in the details of a main column, over all rows; empty where there is none."""
     return _ends(
         (
             measurement.details.get(detail)
@@ -61,7 +82,7 @@ def _range(table: Table, metric: str, detail: str) -> str:
             for row in table.rows
             for measurement in row.row.measurements(metric, column.slice)
         ),
-        "%",
+        unit,
     )
 
 

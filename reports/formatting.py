@@ -38,9 +38,11 @@ _LATEX = {
 
 
 def decimals_for(value: float, unit: str) -> int:
-    """Decimals of one number: 1 for percent; for ratios and distances as many as show 3 digits, 2 and 4 at most."""
+    """Decimals of one number: 1 for percent, none for counts; else as many as show 3 digits, 2 for ratios, 4 at most."""
     if unit == "%":
         return 1
+    if unit in ("count", "B"):
+        return 0
     most = 2 if unit == "1" else 4
     if not math.isfinite(value) or value == 0.0:
         return 2
