@@ -66,6 +66,7 @@ class RealTest(Oracle):
     title = "real motion (test)"
     description = "the source window under its own content and style"
     draws_from = "test"
+    tracks = ("transfer", "transfer/self", "latent")
 
     def answer(self, content: Take, start_frame: int, style: Take, world: World, *, rng: np.random.Generator) -> Take:
         return content
