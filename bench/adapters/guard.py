@@ -21,7 +21,7 @@ import psutil
 
 POLL_S = 0.05
 PR_SET_CHILD_SUBREAPER = 36
-GIVE_UP_S = 10.0
+GRACE_S, GIVE_UP_S = 1.0, 10.0
 CANNOT_START = 127
 
 
@@ -47,6 +47,9 @@ def main(arguments: list[str]) -> int:
     while program.poll() is None and not select.select(ended, [], [], POLL_S)[0]:
         pass
     code = program.poll()
+    program.kill()
+    program.wait()
+    _wait_for_inner_guards()
     _kill_descendants()
     shutil.rmtree(folder, ignore_errors=True)
     return 0 if code is None else code if code >= 0 else 128 - code
@@ -58,10 +61,17 @@ def _adopt_orphans() -> None:
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
+def _wait_for_inner_guards() -> None:
+    """What the program itself had guarded is cleaned up by those guards, if they are given a moment."""
+    deadline = time.monotonic() + GRACE_S
+    while _living_descendants() and time.monotonic() < deadline:
+        time.sleep(POLL_S)
+
+
 def _kill_descendants() -> None:
     deadline = time.monotonic() + GIVE_UP_S
     while time.monotonic() < deadline:
-        alive = [process for process in psutil.Process().children(recursive=True) if _is_alive(process)]
+        alive = _living_descendants()
         if not alive:
             return
         # All are halted before any is killed, so that none can start another meanwhile.
@@ -70,6 +80,10 @@ def _kill_descendants() -> None:
                 with contextlib.suppress(psutil.Error):
                     action(process)
         psutil.wait_procs(alive, timeout=1.0)
+
+
+def _living_descendants() -> list[psutil.Process]:
+    return [process for process in psutil.Process().children(recursive=True) if _is_alive(process)]
 
 
 def _is_alive(process: psutil.Process) -> bool:
