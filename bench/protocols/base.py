@@ -163,9 +163,10 @@ def neutral_style(styles: Iterable[str]) -> str:
     ------
     BadData : none of the known names is there.
     """
-    known = [style for style in NEUTRAL_STYLES if style in set(styles)]
+    there = set(styles)
+    known = [style for style in NEUTRAL_STYLES if style in there]
     if not known:
-        raise BadData(f"no neutral style among {', '.join(sorted(set(styles)))}", remedy="name it neutral or normal")
+        raise BadData(f"no neutral style among {', '.join(sorted(there))}", remedy="name it neutral or normal")
     return known[0]
 
 

@@ -112,7 +112,8 @@ def prepare(
     fit = extra_fit or split.select(takes, "fit")
     facts: dict[str, Any] = {"dataset": dataset.digest, "labels": sorted(labels.items())}
     if extra or extra_fit:
-        facts |= {"version": PACK_VERSION, "protocol": protocol.label, "split": split.digest}
+        # Ids of made takes name their pieces, so protocols that make the same ones share a folder.
+        facts |= {"version": PACK_VERSION, "made": sorted(take.take_id for take in (*extra, *extra_fit))}
         facts |= {"foreign": foreign.digest} if foreign else {}
     return Setting(
         dataset=dataset,
