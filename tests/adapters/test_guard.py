@@ -64,15 +64,19 @@ def test_signals_meant_for_the_harness_do_not_stop_the_guard(tmp_path: Path) -> 
 def test_programs_that_multiply_are_all_ended(tmp_path: Path) -> None:
     code = """
     import os, sys, time
+    first = os.getpid()
     for _ in range(3):
         if os.fork() == 0:
             os.setsid()
-    print('ready', flush=True)
+    if os.getpid() == first:
+        print('ready', flush=True)
     time.sleep(600)
     """
     process, lifeline = started(code, tmp_path)
-    time.sleep(0.3)
-    assert len(left_behind(tmp_path)) >= 8
+    deadline = time.monotonic() + 20.0
+    while len(left_behind(tmp_path)) < 9 and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert len(left_behind(tmp_path)) == 9, "eight programs and their guard"
     ended(process, lifeline)
     assert left_behind(tmp_path) == []
 
