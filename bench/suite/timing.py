@@ -6,13 +6,11 @@ import contextlib
 import json
 import os
 import select
-import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +23,9 @@ from bench.suite.timings import TimingFacts, Timings
 from bench.suite.workers import POLL_S, Limits, Outcome, _death, _environment, _kill_group, tree_rss_mb
 
 __all__ = ["TimingJob", "TimingPlan", "time_adapters"]
+
+LEAVE_S = 2.0
+"""How long a process may take to leave once nothing more is asked of it."""
 
 
 def time_adapters(
@@ -162,12 +163,15 @@ class _Member:
         return self._heard()
 
     def stop(self) -> None:
-        """End the process and all it started."""
+        """End the process and all it started; one that did not fail may first clear up after itself."""
         for end in (self.write_end, self.read_end):
             if end >= 0:
                 os.close(end)
         self.write_end = self.read_end = -1
         if self.process is not None:
+            if self.outcome is None:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self.process.wait(LEAVE_S)
             _kill_group(self.process)
 
     def result(self, companions: int) -> Timings | Outcome:
@@ -180,6 +184,7 @@ class _Member:
             frames_per_call=self.plan.slices,
             transfers=got.ready["transfers"],
             streams=got.ready["streams"],
+            outside_program=got.facts["outside_program"],
             past_frames=self.plan.past_frames,
             load_s=got.loaded["load_s"],
             harness_load_s=got.loaded["harness_load_s"],
@@ -311,18 +316,6 @@ class _Group:
         got.overhead_ns.setdefault(slice_name, []).extend(answer["overhead_ns"])
         if answer["opening_ns"] is not None:
             got.opening_ns.append(answer["opening_ns"])
-
-
-@cache
-def _same_layout() -> tuple[str, ...]:
-    """Command that starts another with addresses that are not random, where the system allows it.
-
-    Random addresses alone set two identical programs up to 3 % apart (Mytkowicz et al. 2009 for such effects).
-    """
-    setarch = shutil.which("setarch")
-    if setarch and subprocess.run([setarch, "-R", "true"], capture_output=True).returncode == 0:
-        return (setarch, "-R")
-    return ()
 
 
 def _seconds(durations_ns: Mapping[str, Sequence[int]]) -> dict[str, FloatArray]:

@@ -21,6 +21,7 @@ from typing import Any
 from threadpoolctl import threadpool_info
 
 from bench.adapters.base import Adapter, Description
+from bench.adapters.external import External
 from bench.adapters.loading import find_adapter
 from bench.adapters.oracles import Oracle
 from bench.errors import BadConfig, BadMotion, BadOutput, BenchError
@@ -74,6 +75,8 @@ def loaded_adapter(job: TimingJob) -> Adapter:
     adapter = adapter_class()
     if job.fit_key:
         adapter.load(Store(Path(job.store)).folder("fit", job.fit_key))
+    if isinstance(adapter, External):
+        adapter.session()
     return adapter
 
 
@@ -171,6 +174,7 @@ class TimingWorker:
             raise BadOutput(f"expected a Description, got {type(described).__name__}", where="describe()")
         declared = described.designed_input_frames if described else None
         return {
+            "outside_program": isinstance(self.adapter, External),
             "parameters": described.parameters if described else None,
             "bytes_per_style": described.bytes_per_style if described else None,
             "designed_input_frames": traits.designed_input_frames if declared is None else declared,

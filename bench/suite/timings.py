@@ -29,6 +29,7 @@ class TimingFacts:
     fps : frame rate of the inputs.
     frames_per_call : slice of the plan -> frames that a call answers, whether the adapter could be timed on it or not.
     transfers, streams : what the adapter can; a streaming one is timed step by step in the slice ``online``.
+    outside_program : motions travel to another program and back, in each call.
     past_frames : frames before the current one that a call without a stream is given online.
     load_s : from the start of the process to the loaded adapter; harness_load_s : of that, before its first import.
     first_call_s, first_call_slice : the first call of all, and on what; warm_up_calls : those after it, in each slice.
@@ -44,6 +45,7 @@ class TimingFacts:
     frames_per_call: Mapping[str, int]
     transfers: bool
     streams: bool
+    outside_program: bool
     past_frames: int
     load_s: float
     harness_load_s: float

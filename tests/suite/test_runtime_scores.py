@@ -7,7 +7,7 @@ import pytest
 
 from bench.metrics import METRICS
 from bench.metrics.catalogue import RUNTIME_METRICS
-from bench.suite.scores.runtime import NO_DESIGN, NO_TRANSFER, NOT_DESCRIBED, runtime_measurements
+from bench.suite.scores.runtime import NO_DESIGN, NO_TRANSFER, NOT_DESCRIBED, OUTSIDE, runtime_measurements
 from bench.suite.timing_plan import ONLINE
 from bench.suite.timings import Timings
 from reports.records import Measurement
@@ -88,10 +88,11 @@ def test_waiting_for_a_core_is_taken_out_and_told() -> None:
     online = found["latency_p50", ONLINE]
     assert online.value == pytest.approx(15.0) and online.details["wall_p50_ms"] == pytest.approx(19.0)
     assert online.details["waited_percent"] == pytest.approx(100 * 4 / 19)
-    assert str(online.reason).endswith("kept; a busy host: 21 % of the timed seconds went to other processes")
+    assert str(online.reason).endswith("kept; a busy host: over 5 % of the timed seconds went to other processes")
     assert found["deadline_miss", "online 60 fps"].value == pytest.approx(100 * 34 / 101)
     assert (
-        found["latency_p50", "offline L=60"].reason == "a busy host: 7 % of the timed seconds went to other processes"
+        found["latency_p50", "offline L=60"].reason
+        == "a busy host: over 5 % of the timed seconds went to other processes"
     )
     assert found["latency_p50", "offline L=120"].reason is None
 
@@ -104,6 +105,12 @@ def test_online_says_whether_it_streams() -> None:
     streamed = by_name(timings(replace(FACTS, streams=True)))["latency_p50", ONLINE]
     assert streamed.details["streaming"] == 1.0 and streamed.details["open_stream_ms"] == pytest.approx(2.0)
     assert streamed.reason is None
+
+
+def test_an_outside_program_says_what_its_calls_contain() -> None:
+    found = by_name(timings(replace(FACTS, outside_program=True)))
+    assert found["latency_p50", "offline L=60"].reason == OUTSIDE
+    assert str(found["latency_p50", ONLINE].reason).endswith(OUTSIDE)
 
 
 def test_a_method_that_only_streams_has_no_offline_numbers() -> None:

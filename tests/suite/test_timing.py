@@ -16,6 +16,7 @@ from bench.suite.timing import time_adapters
 from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan, Turns, read_job, write_job
 from bench.suite.timings import ARRAYS_FILE, FACTS_FILE, Timings
 from bench.suite.workers import Limits, Outcome
+from tests.adapters.outside import COPY, left_behind, with_worker
 from tests.suite.timing_factory import SMALL, job_of, world, written
 from tests.suite.timings_factory import timings
 
@@ -69,6 +70,20 @@ def facts_of(found: Timings | Outcome) -> Timings:
     return found
 
 
+def test_one_fails_and_the_other_is_timed(tmp_path: Path) -> None:
+    world(tmp_path)
+    jobs = [
+        job_of(tmp_path, written(tmp_path, "raising", BODIES["raising"]), "raising"),
+        job_of(tmp_path, AdapterSource("copy-content"), "good"),
+    ]
+    found = timed(jobs, tmp_path)
+    assert found["raising"] == Outcome("failed", "ValueError: clip 317", "timing-0-raising-seed7.log")
+    good = facts_of(found["good"])
+    assert "ValueError: clip 317" in (tmp_path / "scratch" / "timing-0-raising-seed7.log").read_text()
+    assert {len(values) for values in good.durations_s.values()} == {SMALL.rounds * SMALL.calls}
+
+
+@pytest.mark.slow
 def test_what_fails_disturbs_nothing_else(tmp_path: Path) -> None:
     world(tmp_path)
     jobs = [job_of(tmp_path, written(tmp_path, name, body), name) for name, body in BODIES.items()]
@@ -80,7 +95,12 @@ def test_what_fails_disturbs_nothing_else(tmp_path: Path) -> None:
     fit = tmp_path / "store" / "fit" / "abc"
     fit.mkdir(parents=True)
     (fit / "shift.txt").write_text("0.5")
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    with_worker(outside, COPY)
+    jobs.append(job_of(tmp_path, AdapterSource("outside", str(outside / "adapter.toml")), "outside"))
     found = timed(jobs, tmp_path, replace(SMALL, group_size=5))
+    assert left_behind(outside) == []
     for name, (status, reason) in EXPECTED.items():
         outcome = found[name]
         assert isinstance(outcome, Outcome)
@@ -100,7 +120,8 @@ def test_what_fails_disturbs_nothing_else(tmp_path: Path) -> None:
     assert (good.facts.streams, good.facts.parameters, len(good.opening_s)) == (False, None, 0)
     assert (streaming.facts.streams, streaming.facts.parameters, len(streaming.opening_s)) == (True, 1608, SMALL.rounds)
     assert isinstance(found["fitted"], Timings)
-    assert (good.facts.companions, streaming.facts.companions) == (4, 1)
+    assert facts_of(found["outside"]).facts.outside_program and not good.facts.outside_program
+    assert (good.facts.companions, streaming.facts.companions) == (4, 2)
 
 
 def test_a_hanging_adapter_is_stopped_with_what_it_started(tmp_path: Path) -> None:
@@ -110,6 +131,7 @@ def test_a_hanging_adapter_is_stopped_with_what_it_started(tmp_path: Path) -> No
     assert outcome == Outcome("timeout", "no answer within 6 s", "timing-0-hanging-seed7.log")
 
 
+@pytest.mark.slow
 def test_an_adapter_that_grows_is_stopped(tmp_path: Path) -> None:
     world(tmp_path)
     grow = "self.kept = np.ones((2000, 2**18))\nreturn content.clip"
@@ -183,8 +205,9 @@ def test_identical_adapters_agree_and_a_known_duration_is_found(tmp_path: Path) 
         job_of(tmp_path, AdapterSource("pose-adain"), "other"),
         job_of(tmp_path, sleeping, "sleeping"),
     ]
+    plan = TimingPlan(lengths=(60,))
     for attempt in range(3):
-        found = {key: facts_of(one) for key, one in timed(jobs, tmp_path / str(attempt), TimingPlan()).items()}
+        found = {key: facts_of(one) for key, one in timed(jobs, tmp_path / str(attempt), plan).items()}
         medians = {
             key: {name: float(np.median(one.own_s(name))) for name in one.durations_s} for key, one in found.items()
         }

@@ -12,6 +12,7 @@ FACTS = TimingFacts(
     frames_per_call=TimingPlan().slices,
     transfers=True,
     streams=False,
+    outside_program=False,
     past_frames=32,
     load_s=1.5,
     harness_load_s=1.0,

@@ -32,6 +32,7 @@ ALL = "all"
 BUSY_PERCENT = 5.0
 """Share of the timed seconds without a core above which a row says that the host was busy."""
 NO_TRANSFER = "the adapter streams only: it has no call on whole clips"
+OUTSIDE = "an outside program: handing motions over and back is part of a call"
 NOT_DESCRIBED = "the adapter does not describe itself"
 NO_DESIGN = "the adapter declares no input length it was designed for"
 
@@ -71,8 +72,10 @@ def _call_measurements(timings: Timings, slice_name: str) -> list[Measurement]:
     frames, n = facts.frames_per_call[slice_name], len(durations_s)
     statistics = duration_statistics(durations_s)
     reasons = [_online_reason(facts)] if slice_name == ONLINE else []
+    if facts.outside_program:
+        reasons.append(OUTSIDE)
     if waited_percent > BUSY_PERCENT:
-        reasons.append(f"a busy host: {waited_percent:.0f} % of the timed seconds went to other processes")
+        reasons.append(f"a busy host: over {BUSY_PERCENT:g} % of the timed seconds went to other processes")
     reason = "; ".join(filter(None, reasons))
     details = {
         "harness_overhead_us": 1e6 * float(np.median(timings.overhead_s[slice_name])),
