@@ -16,6 +16,7 @@ from bench.errors import BadConfig, BenchError
 
 if TYPE_CHECKING:
     from bench.suite.request import RunRequest
+    from bench.suite.submit import Data
 
 RUNS = Path("runs")
 STORE = RUNS / "store"
@@ -69,6 +70,7 @@ def run(
     seed: Annotated[int, typer.Option(help="Method seed.")] = 0,
     budget: Annotated[str, typer.Option(help="Training budget of methods that fit.")] = "small",
     split: Annotated[str, typer.Option(help="default, contiguous or interleaved.")] = "default",
+    against: Annotated[str, typer.Option(help="Rows to stand beside: leaderboard, or a run folder.")] = "",
     retrain_judges: Annotated[bool, typer.Option(help="Train judges here; do not use the committed ones.")] = False,
     dry_run: Annotated[bool, typer.Option(help="Print cells, minutes and disk; run nothing.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print results as JSON.")] = False,
@@ -79,6 +81,7 @@ def run(
     """
     from bench.suite import request as asked
     from bench.suite import run as suite
+    from bench.suite.output import stand_beside
 
     request = asked.RunRequest(
         data=_data_options(data or ["procedural"]),
@@ -103,10 +106,123 @@ def run(
         result = suite.run(request, progress)
     if out is None:
         asked.latest_link(request.out)
+    if against:
+        stand_beside(request.out, against)
     for left in result.left_out:
         console.complain(f"left out: {left}")
     failed = _report_run(request.out, as_json, f"{result.generated} cells generated, {result.scored} metrics computed")
     if failed:
+        raise typer.Exit(1)
+
+
+@app.command(name="new-adapter")
+def new_adapter(
+    name: Annotated[str, typer.Argument(help="a-z, 0-9 and _; the row's name.")],
+    outside: Annotated[bool, typer.Option("--outside", help="For a program in an environment of its own.")] = False,
+) -> None:
+    """Write an adapter that passes the check at once.
+
+    Example: stylebench new-adapter my_method
+    """
+    from bench.adapters.scaffold import write_new_adapter, write_new_program
+
+    path = (write_new_program if outside else write_new_adapter)(name, Path.cwd())
+    target = path / "adapter.toml" if outside else path
+    console.say(f"wrote {path.name}; now: stylebench check {target.relative_to(Path.cwd())}")
+
+
+@app.command()
+def check(
+    target: Annotated[str, typer.Argument(help="FILE.py, FILE.py:Class, adapter.toml, a method's name, or a folder.")],
+    data: Annotated[str, typer.Option(help="Dataset of a submission folder, NAME or NAME=PATH.")] = "procedural",
+    store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
+    log: Annotated[Path, typer.Option(help="File for what the adapter prints.")] = Path("check.log"),
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+) -> None:
+    """Check that an adapter or a folder of answers keeps the contract.
+
+    Example: stylebench check my_method.py
+    """
+    from bench.adapters.check_run import check_option
+    from bench.suite.submission import check_submission
+    from bench.suite.submit import exported_setting
+
+    folder = Path(target)
+    if folder.is_dir():
+        with console.ProgressDisplay() as progress:
+            rows = list(check_submission(folder, exported_setting(folder, _data(data), store, progress)))
+    else:
+        rows = list(check_option(target, log=log))
+    if as_json:
+        console.say_json([vars(row) for row in rows])
+    else:
+        marks = {True: "ok", False: "FAILS", None: "-"}
+        lines = [[marks[row.ok], row.name, row.expected, row.got, row.cause, row.remedy] for row in rows]
+        console.show_rows(["", "check", "expected", "got", "likely cause", "remedy"], lines)
+    if any(row.ok is False for row in rows):
+        raise typer.Exit(1)
+
+
+@app.command(name="export-tasks")
+def export_tasks(
+    out: Annotated[Path, typer.Argument(help="A new folder.")],
+    data: Annotated[str, typer.Option(help="Dataset as NAME or NAME=PATH.")] = "procedural",
+    protocol: Annotated[str, typer.Option(help="Label of the protocol.")] = "stylebench-transfer@1",
+    profile: Annotated[str, typer.Option(help="smoke, quick or standard.")] = "quick",
+    motions: Annotated[str, typer.Option(help="bvh or npz.")] = "bvh",
+    labels: Annotated[str, typer.Option(help="Of style, content, source-style: what the method needs.")] = "",
+    with_fit: Annotated[bool, typer.Option("--with-fit", help="Also write what may be trained on.")] = False,
+    store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
+) -> None:
+    """Write the tasks as motion files, to be answered anywhere with any tool.
+
+    Example: stylebench export-tasks out --profile smoke
+    """
+    from bench.suite import submission, submit
+
+    traits = submit.traits_of_labels(_names(labels))
+    with console.ProgressDisplay() as progress:
+        setting = submit.setting_of(_data(data), protocol, profile, store, progress)
+        path = submission.export_tasks(
+            setting, out, traits=traits, motions=motions, with_fit=with_fit,
+            progress=lambda what, done, total: progress("data", what, done, total),
+        )  # fmt: skip
+    console.say(f"wrote {len(setting.tasks)} tasks; {path} lists them, {out / 'README.txt'} says what to do")
+
+
+@app.command()
+def score(
+    folder: Annotated[Path, typer.Argument(help="A folder of exported tasks with all answers.")],
+    data: Annotated[str, typer.Option(help="Dataset as NAME or NAME=PATH.")] = "procedural",
+    against: Annotated[str, typer.Option(help="Rows to stand beside: leaderboard, or a run folder.")] = "",
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<time>, and runs/latest.")] = None,
+    store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
+    as_json: Annotated[bool, typer.Option("--json", help="Print results as JSON.")] = False,
+) -> None:
+    """Score a folder of answers; nothing in it is executed.
+
+    Example: stylebench score out --against runs/latest
+    """
+    from bench.suite import request as asked
+    from bench.suite import submit
+    from bench.suite.output import stand_beside
+
+    request = asked.RunRequest(
+        data={},
+        out=out or asked.default_out(RUNS),
+        store=store,
+        tracks=(),
+        jobs=1,
+        command=shlex.join(["stylebench", *sys.argv[1:]]),
+    )
+    with console.ProgressDisplay() as progress:
+        setting = submit.exported_setting(folder, _data(data), store, progress)
+        record = submit.score_submission(folder, setting, request, progress)
+    if out is None:
+        asked.latest_link(request.out)
+    if against:
+        stand_beside(request.out, against)
+    if _report_run(request.out, as_json, f"scored {record.method.name}"):
         raise typer.Exit(1)
 
 
@@ -214,6 +330,13 @@ def clean(
 
 def _names(option: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in option.split(",") if name.strip())
+
+
+def _data(option: str) -> Data:
+    from bench.suite.submit import Data
+
+    [(name, path)] = _data_options([option]).items()
+    return Data(name, path)
 
 
 def _data_options(options: list[str]) -> dict[str, Path | None]:

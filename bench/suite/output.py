@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
+import reports
+from bench.errors import BadConfig
 from reports.figures import interval_bars, recognition_scatter, save_figure
 from reports.heatmap import part_heatmap
-from reports.records import write_text_atomically
+from reports.records import samples_path, write_text_atomically
 from reports.render import render
-from reports.rows import GroupKey, load_run
+from reports.rows import GroupKey, group_key, load_run
 from reports.tables import Column, Table, TableRow, tables_of_run
 
 
@@ -56,6 +59,39 @@ def _figures(table: Table) -> Iterator[tuple[str, Figure]]:
 def _has(row: TableRow, column: Column) -> bool:
     found = row.estimates.get(column.key)
     return found is not None and found.value is not None
+
+
+PUBLISHED = Path(reports.__file__).with_name("published")
+
+
+def stand_beside(folder: Path, against: str) -> int:
+    """Copy records into a run folder that belong into its tables: the rows a new one is read against.
+
+    ``against`` is ``leaderboard``, a run folder or a folder of records. A method that the run has itself is not copied.
+    Returns how many were copied.
+
+    Raises
+    ------
+    BadConfig : nothing there belongs beside the run's records.
+    """
+    own = load_run(folder)
+    tables = {group_key(item.record) for item in own}
+    methods = {(group_key(item.record), item.record.method.name) for item in own}
+    copied = 0
+    for record, path in load_run(PUBLISHED if against == "leaderboard" else Path(against)):
+        if group_key(record) not in tables or (group_key(record), record.method.name) in methods:
+            continue
+        for source in (samples_path(path), path):
+            if source.is_file():
+                shutil.copyfile(source, folder / "records" / source.name)
+        copied += 1
+    if not copied:
+        raise BadConfig(
+            f"{against} has no row for {', '.join(sorted({t.protocol for t in tables}))} of this data and profile",
+            where="--against",
+            remedy="run its rows with the same data, protocol and profile first",
+        )
+    return copied
 
 
 def failures(folder: Path) -> dict[str, str]:

@@ -76,7 +76,7 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     datasets = _loaded(request, progress)
     store = Store(request.store)
     store.sweep()
-    records_folder = _fresh_records_folder(request.out)
+    records_folder = fresh_records_folder(request.out)
     planned = _settings(request, datasets, store)
     records: list[Record] = []
     generated = scored = 0
@@ -85,14 +85,15 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
         if setting.protocol.track == "runtime":
             records.extend(time_cells(request, setting, cells, store, progress, records_folder))
             continue
-        part = _RunSetting(request, setting, store, progress).run(cells, records_folder)
+        part = SettingRun(request, setting, store, progress).run(cells, records_folder)
         records.extend(part.records)
         generated += part.generated
         scored += part.scored
     return RunResult(tuple(records), generated, scored, planned.left_out)
 
 
-def _fresh_records_folder(out: Path) -> Path:
+def fresh_records_folder(out: Path) -> Path:
+    """The records folder of a run, emptied."""
     folder = out / "records"
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.iterdir():
@@ -133,7 +134,7 @@ def _cells(request: RunRequest, setting: Setting) -> list[Cell]:
     return [cell for cell in cells if not cell.unsupported or cell.facts.name in request.methods]
 
 
-class _RunSetting:
+class SettingRun:
     """One protocol on one dataset: judges, reference, then all cells, ``jobs`` at a time."""
 
     def __init__(self, request: RunRequest, setting: Setting, store: Store, progress: Progress) -> None:
