@@ -19,6 +19,11 @@ SCHEDULER_STATISTICS = "/proc/thread-self/schedstat"
 class Stopwatch(Protocol):
     """Two clocks of the calling thread."""
 
+    @property
+    def knows_waiting(self) -> bool:
+        """False where the second clock stands still."""
+        ...
+
     def now_ns(self) -> int:
         """Monotonic wall clock."""
         ...

@@ -192,6 +192,7 @@ class _Member:
             first_call_slice=got.first["slice"],
             warm_up_calls=got.warm_up_calls,
             threads=got.facts["threads"],
+            waiting_known=got.facts["waiting_known"],
             companions=companions,
             start_memory_mb=got.loaded["memory_mb"],
             peak_memory_mb=max(got.facts["peak_memory_mb"], self.peak_tree_mb),

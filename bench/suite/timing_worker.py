@@ -179,6 +179,7 @@ class TimingWorker:
             "bytes_per_style": described.bytes_per_style if described else None,
             "designed_input_frames": traits.designed_input_frames if declared is None else declared,
             "threads": self._thread_counts(),
+            "waiting_known": self.stopwatch.knows_waiting,
             "peak_memory_mb": memory_mb("VmHWM"),
         }
 

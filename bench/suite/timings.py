@@ -34,6 +34,7 @@ class TimingFacts:
     load_s : from the start of the process to the loaded adapter; harness_load_s : of that, before its first import.
     first_call_s, first_call_slice : the first call of all, and on what; warm_up_calls : those after it, in each slice.
     threads : ``limit`` that was set, and what BLAS and torch, where they are there, then say of themselves.
+    waiting_known : whether the system counts how long a call waited for a core.
     companions : adapters that took turns with this one.
     start_memory_mb, peak_memory_mb : resident memory before the first import of the adapter, and the most it had.
     parameters, bytes_per_style, designed_input_frames : as declared; None where they are not.
@@ -53,6 +54,7 @@ class TimingFacts:
     first_call_slice: str
     warm_up_calls: int
     threads: Mapping[str, int]
+    waiting_known: bool
     companions: int
     start_memory_mb: float
     peak_memory_mb: float

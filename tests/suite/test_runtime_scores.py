@@ -80,6 +80,11 @@ def test_latency_carries_how_it_was_measured() -> None:
     )
 
 
+def test_waiting_that_nobody_counts_is_not_told() -> None:
+    found = by_name(timings(replace(FACTS, waiting_known=False)))
+    assert "waited_percent" not in found["latency_p50", "offline L=60"].details
+
+
 def test_waiting_for_a_core_is_taken_out_and_told() -> None:
     kept = timings()
     wall = {name: values + 0.004 for name, values in kept.durations_s.items()}

@@ -59,6 +59,8 @@ def written(folder: Path, name: str, transfer: str, rest: str = "") -> AdapterSo
 class Ticker:
     """Clocks that stand still unless they are moved."""
 
+    knows_waiting = True
+
     def __init__(self) -> None:
         self.ns = self.waited = 0
 

@@ -20,6 +20,7 @@ FACTS = TimingFacts(
     first_call_slice="offline L=60",
     warm_up_calls=10,
     threads={"limit": 1, "blas": 1},
+    waiting_known=True,
     companions=2,
     start_memory_mb=150.0,
     peak_memory_mb=200.0,

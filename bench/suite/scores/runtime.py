@@ -80,7 +80,7 @@ def _call_measurements(timings: Timings, slice_name: str) -> list[Measurement]:
     details = {
         "harness_overhead_us": 1e6 * float(np.median(timings.overhead_s[slice_name])),
         "wall_p50_ms": 1e3 * float(np.median(wall_s)),
-        "waited_percent": waited_percent,
+        **({"waited_percent": waited_percent} if facts.waiting_known else {}),
         "p95_ms": 1e3 * statistics.p95_s,
         "iqr_ms": 1e3 * statistics.iqr_s,
         "end_to_end": 1.0,
