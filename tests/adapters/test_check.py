@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import textwrap
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -292,12 +291,10 @@ class Mine(Adapter):
 def test_adapter_that_hangs_or_dies_costs_a_row(tmp_path: Path, body: str, name: str, got: str) -> None:
     file = tmp_path / "mine.py"
     file.write_text(HEAD + textwrap.indent(body, " " * 8))
-    started = time.monotonic()
     rows = list(check_option(str(file), log=tmp_path / "check.log", row_limit_s=4.0 if "sleep" in body else 60.0))
     [row] = [row for row in rows if row.ok is False]
     assert (row.name, row.got) == (name, got)
     assert left_behind(tmp_path) == []
-    assert time.monotonic() - started < 90.0
 
 
 def test_check_by_path_name_or_toml(tmp_path: Path) -> None:

@@ -3,14 +3,17 @@ from __future__ import annotations
 import contextlib
 import json
 import tracemalloc
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.adapters.program import Program, parse_toml, program_of, read_program
+from bench.adapters.base import CAPABILITIES, Traits
+from bench.adapters.program import Program, Timeouts, parse_toml, program_of, read_program
 from bench.adapters.session import MAX_LINE_BYTES, one_line, parse_message
+from bench.adapters.worker import Worker
 from bench.errors import BadConfig, MethodFailed
 
 SMALLEST = {"name": "mine", "command": ["python", "x.py"], "capabilities": ["transfers"]}
@@ -113,3 +116,12 @@ def test_foreign_text_becomes_one_printable_line(text: str) -> None:
     shown = one_line(text)
     assert len(shown) <= 300
     assert shown.isprintable()
+
+
+def test_docs_name_every_key_and_every_call() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "adding-a-method.md").read_text()
+    keys = {*Program.model_fields, *Timeouts.model_fields, *(field.name for field in fields(Traits))}
+    keys -= {"toml_file", "environment", "traits", "timeouts"}
+    calls = {name.removeprefix("_on_") for name in vars(Worker) if name.startswith("_on_")}
+    for word in (*keys, *CAPABILITIES, *calls, "cancel", "stop", "[environment]", "[traits]", "[timeouts]"):
+        assert f"`{word}`" in page, word
