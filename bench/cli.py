@@ -157,8 +157,11 @@ def check(
         console.say_json([vars(row) for row in rows])
     else:
         marks = {True: "ok", False: "FAILS", None: "-"}
-        lines = [[marks[row.ok], row.name, row.expected, row.got, row.cause, row.remedy] for row in rows]
-        console.show_rows(["", "check", "expected", "got", "likely cause", "remedy"], lines)
+        lines = [[marks[row.ok], row.name, row.expected, row.got] for row in rows]
+        console.show_rows(["", "check", "expected", "got"], lines)
+        for row in (row for row in rows if row.ok is False):
+            advice = [f"likely cause: {row.cause}"] * bool(row.cause) + [f"remedy: {row.remedy}"] * bool(row.remedy)
+            console.complain("; ".join([f"{row.name}: expected {row.expected}, got {row.got}", *advice]))
     if any(row.ok is False for row in rows):
         raise typer.Exit(1)
 
