@@ -151,6 +151,11 @@ class Adapter:
         """True where the adapter learns from the fit part."""
         return cls.fit is not Adapter.fit
 
+    @classmethod
+    def digest_files(cls) -> tuple[Path, ...]:
+        """For adapters of outside programs: the files that decide the answers; empty where the class's code does."""
+        return ()
+
     def _cannot(self, capability: str) -> BadConfig:
         return BadConfig(
             f"adapter {self.name!r} does not declare that it {capability}",

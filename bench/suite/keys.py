@@ -16,7 +16,13 @@ OWN_PACKAGES = ("bench", "classifiers", "reports")
 
 
 def adapter_digest(adapter: type[Adapter]) -> str:
-    """Digest of an adapter: its file and every file of this project that the file imports, directly or not."""
+    """Digest of an adapter: its file and every file of this project that the file imports, directly or not.
+
+    For an outside program the files that it lists, by content alone: where they lie does not matter.
+    """
+    listed = adapter.digest_files()
+    if listed:
+        return digest_of({"class": adapter.name, "files": sorted(_file_digest(path) for path in listed)})
     source = Path(inspect.getfile(adapter)).resolve()
     return digest_of({"class": adapter.__qualname__, "files": _content_digests(source)})
 
