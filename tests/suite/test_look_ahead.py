@@ -86,6 +86,25 @@ def test_random_answers_have_no_look_ahead() -> None:
     assert (found.frames, found.reason) == (None, "two equal calls gave different outputs")
 
 
+def test_a_method_that_picks_by_the_whole_clip_is_found_out() -> None:
+    """One of two stored answers, by the mean height of the root: most small changes leave the choice as it is."""
+    low, high = random_clip(64, seed=8), random_clip(64, seed=9)
+
+    def transfer(clip: Clip) -> Clip:
+        return low if clip.root_xyz_m[:, 1].mean() < CLIP.root_xyz_m[:, 1].mean() - 0.002 else high
+
+    found = measured_look_ahead(transfer, CLIP)
+    assert found.frames is not None and found.frames > 16
+
+
+def test_a_fault_on_the_motion_itself_is_no_matter_of_look_ahead() -> None:
+    def transfer(clip: Clip) -> Clip:
+        raise MethodFailed("always")
+
+    with pytest.raises(MethodFailed, match="always"):
+        measured_look_ahead(transfer, CLIP)
+
+
 def test_a_method_that_refuses_changed_motion_has_none() -> None:
     def transfer(clip: Clip) -> Clip:
         if not np.array_equal(clip.root_xyz_m, CLIP.root_xyz_m):
@@ -94,4 +113,4 @@ def test_a_method_that_refuses_changed_motion_has_none() -> None:
 
     found = measured_look_ahead(transfer, CLIP)
     assert found.frames is None
-    assert "a call on changed motion failed: I know this motion only" in found.reason
+    assert "a call on changed motion failed: MethodFailed: I know this motion only" in found.reason
