@@ -121,6 +121,8 @@ class Provenance(_Strict):
     wall_s: float
     peak_rss_mb: float
     command: str
+    retried: str = ""
+    """why the cell was run a second time, where the worker at it was lost"""
 
 
 class Record(_Strict):

@@ -77,7 +77,7 @@ class Job:
 
 def main(arguments: list[str]) -> int:
     """Run a job; every outcome is a message, the exit code only says whether the worker itself lived."""
-    threading.Thread(target=_leave_with_parent, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=leave_with_parent, args=(os.getppid(),), daemon=True).start()
     pipe = os.fdopen(int(arguments[1]), "w", buffering=1)
 
     def send(message: dict[str, Any]) -> None:
@@ -102,7 +102,7 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _leave_with_parent(parent: int) -> None:
+def leave_with_parent(parent: int) -> None:
     """End this process soon after the one that started it is gone, also in the middle of a long fit."""
     while os.getppid() == parent:
         time.sleep(1.0)

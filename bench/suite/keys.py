@@ -38,13 +38,27 @@ def _content_digests(start: Path) -> list[str]:
     return sorted(_file_digest(path) for path in seen)
 
 
-@cache
 def _file_digest(path: Path) -> str:
+    return _digest_as_of(path, *_when(path))
+
+
+def _own_imports(path: Path) -> tuple[Path, ...]:
+    return _imports_as_of(path, *_when(path))
+
+
+def _when(path: Path) -> tuple[int, int]:
+    """What a change of a file changes: a process that lives through one must not answer with the old file."""
+    facts = path.stat()
+    return facts.st_mtime_ns, facts.st_size
+
+
+@cache
+def _digest_as_of(path: Path, changed_ns: int, size: int) -> str:
     return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
 
 
 @cache
-def _own_imports(path: Path) -> tuple[Path, ...]:
+def _imports_as_of(path: Path, changed_ns: int, size: int) -> tuple[Path, ...]:
     """Files of this project named in import statements anywhere in ``path``, and files beside a user's adapter."""
     names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

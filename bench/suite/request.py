@@ -37,6 +37,8 @@ class RunRequest:
     protocols : labels in PROTOCOLS, run beside the tracks; a name without a condition means all of its conditions.
     profile : ``quick`` or ``standard``.
     out, store : run folder and store folder.
+    scheduler : address of a Dask scheduler, or the file that it wrote; empty for ``jobs`` processes of this machine.
+    keep_failures : cells that failed in an earlier run with this store keep that outcome and are not tried again.
     command : as typed, for the records.
     """
 
@@ -49,6 +51,8 @@ class RunRequest:
     protocols: tuple[str, ...] = ()
     profile: str = "quick"
     jobs: int = 2
+    scheduler: str = ""
+    keep_failures: bool = False
     seed: int = 0
     budget: str = "small"
     split: str = "default"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -199,9 +199,9 @@ def _write_scored(scored: Scored, folder: Path) -> dict[str, Any]:
     return {"measurements": [measurement.model_dump(mode="json") for measurement in scored.measurements]}
 
 
-@cache
+@lru_cache(maxsize=2)
 def open_scorer(spec: ScoreSpec) -> Scorer:
-    """One scorer per process and setting."""
+    """One scorer per process and setting; few are kept, for a process may live through many settings."""
     return Scorer(spec)
 
 

@@ -16,11 +16,12 @@ from bench.suite.keys import generate_key
 from bench.suite.motions import Motions
 from bench.suite.plan import Cell
 from bench.suite.request import RunRequest, check_request
-from bench.suite.run import SettingRun, fresh_records_folder
+from bench.suite.run import fresh_records_folder
+from bench.suite.session import Progress, session_of
 from bench.suite.setting import Setting, prepare
+from bench.suite.setting_run import SettingRun
 from bench.suite.store import Store
 from bench.suite.submission import MANIFEST, Submission, read_submission
-from bench.suite.timed import Progress
 from reports.records import MethodFacts, Record
 
 MANIFEST_LIMIT_BYTES = 2**24
@@ -100,7 +101,8 @@ def score_submission(folder: Path, setting: Setting, request: RunRequest, progre
     cell = _cell(found, setting)
     if not store.has("motions", cell.motions_key):
         store.put("motions", cell.motions_key, lambda draft: _write(found.motions, draft))
-    [record] = SettingRun(request, setting, store, progress).run([cell], fresh_records_folder(request.out)).records
+    with session_of(request, progress) as session:
+        [record] = SettingRun(session, setting).run([cell], fresh_records_folder(request.out)).records
     return record
 
 

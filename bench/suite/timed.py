@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 
 from bench.metrics.runtime import DEADLINE_FPS
 from bench.suite import assemble
+from bench.suite.calls import CellCall, TimingCall, made_here
 from bench.suite.cell import FIT_ONLY, GenerateJob, Job
 from bench.suite.plan import Cell
-from bench.suite.provenance import provenance
-from bench.suite.request import RunRequest
 from bench.suite.scores.runtime import runtime_measurements
+from bench.suite.session import Session
 from bench.suite.setting import Setting
 from bench.suite.store import Store
-from bench.suite.timing import TimingJob, TimingPlan, time_adapters
+from bench.suite.timing import TimingJob, TimingPlan
 from bench.suite.timings import Timings
-from bench.suite.workers import Outcome, run_job
-from reports.records import Record
-
-Progress = Callable[[str, str, int, int], None]
-"""Called as ``progress(stage, what, done, total)``; stages are ``data``, ``judges``, ``reference``, ``cells``."""
+from bench.suite.workers import Outcome
+from reports.records import Provenance, Record
 
 PLANS = {
     "smoke": TimingPlan(rounds=5, calls=4, warm_up_calls=2, bound_s=2.0),
@@ -47,51 +43,63 @@ def job_of(setting: Setting, cell: Cell, store: Store, work: GenerateJob) -> Job
     )
 
 
-def fit_cell(request: RunRequest, setting: Setting, cell: Cell, store: Store, progress: Progress) -> Outcome:
-    """Train a cell's method unless the store has it."""
-    if not cell.fit_key or store.has("fit", cell.fit_key):
-        return Outcome("ok")
-
-    def listener(key: str, what: str, done: int, total: int) -> None:
-        progress("cells", f"{cell.facts.title}: {what} {done}/{total}", -1, -1)
-
-    job = job_of(setting, cell, store, GenerateJob(cell.fit_key, "", FIT_ONLY, setting.protocol.fps))
-    outcome = run_job(job, request.out / "logs", limits=request.limits, listener=listener)[cell.fit_key]
-    return replace(outcome, log=f"logs/{outcome.log}") if outcome.log else outcome
-
-
-def time_cells(
-    request: RunRequest,
-    setting: Setting,
-    cells: Sequence[Cell],
-    store: Store,
-    progress: Progress,
-    records_folder: Path,
-) -> list[Record]:
+def time_cells(session: Session, setting: Setting, cells: Sequence[Cell], records_folder: Path) -> list[Record]:
     """Time every cell and store its record. Timings are never reused: they belong to this machine and hour."""
+    keys = [assemble.record_key(setting, cell) for cell in cells]
     results: dict[str, Timings | Outcome] = {}
-    jobs = []
-    for cell in cells:
-        outcome = (
-            Outcome("unsupported", cell.unsupported)
-            if cell.unsupported
-            else fit_cell(request, setting, cell, store, progress)
-        )
-        if outcome.status == "ok":
-            jobs.append(_timing_job(setting, cell, store))
-        else:
-            results[cell.motions_key] = outcome
-    results |= time_adapters(
-        jobs,
-        PLANS[request.profile],
-        request.out / "logs",
-        limits=request.limits,
-        progress=lambda what, done, total: progress("cells", what, done, total),
-    )
-    records = [_record(request, setting, cell, results[cell.motions_key]) for cell in cells]
-    for record in records:
-        assemble.write(records_folder, record)
+    if session.request.keep_failures:
+        kept = {cell.motions_key: session.failures.recall(key) for key, cell in zip(keys, cells, strict=True)}
+        results |= {key: outcome for key, outcome in kept.items() if outcome is not None}
+    results |= {cell.motions_key: Outcome("unsupported", cell.unsupported) for cell in cells if cell.unsupported}
+    results |= _unfitted(session, setting, [cell for cell in cells if cell.motions_key not in results])
+    jobs = [_timing_job(setting, cell, session.store) for cell in cells if cell.motions_key not in results]
+    made = made_here(session.request.command, session.request.limits.threads, {})
+    if jobs:
+        name = f"timing {len(jobs)} methods for {setting.protocol.label} on {setting.dataset.dataset_id}"
+        [answer] = session.answers([_timing_call(session, jobs)], name)
+        results |= answer.results
+        made = answer.made
+    records = []
+    for key, cell in zip(keys, cells, strict=True):
+        result = results[cell.motions_key]
+        session.failures.note(key, result if isinstance(result, Outcome) else Outcome("ok"))
+        records.append(_record(setting, cell, result, made))
+        assemble.write(records_folder, records[-1])
     return records
+
+
+def _unfitted(session: Session, setting: Setting, cells: Sequence[Cell]) -> dict[str, Outcome]:
+    """Train what the store lacks; the outcomes of cells whose training failed, by the key of their motions."""
+    waiting = [cell for cell in cells if cell.fit_key and not session.store.has("fit", cell.fit_key)]
+    calls = [
+        CellCall(
+            name=f"fit-{assemble.record_key(setting, cell)}",
+            home=session.home,
+            needs=(("takes", setting.pack_folder.name),),
+            job=job_of(setting, cell, session.store, GenerateJob(cell.fit_key, "", FIT_ONLY, setting.protocol.fps)),
+            spec=None,
+            given=cell.given,
+            limits=session.request.limits,
+            logs=session.logs,
+            command=session.request.command,
+        )
+        for cell in waiting
+    ]
+    answers = session.answers(calls, f"training for {setting.protocol.label}") if calls else []
+    ended = {cell.motions_key: answer.outcome for cell, answer in zip(waiting, answers, strict=True)}
+    return {key: outcome for key, outcome in ended.items() if outcome.status != "ok"}
+
+
+def _timing_call(session: Session, jobs: Sequence[TimingJob]) -> TimingCall:
+    return TimingCall(
+        name=f"timing-{jobs[0].key}",
+        home=session.home,
+        jobs=tuple(jobs),
+        plan=PLANS[session.request.profile],
+        limits=session.request.limits,
+        logs=session.logs,
+        command=session.request.command,
+    )
 
 
 def _timing_job(setting: Setting, cell: Cell, store: Store) -> TimingJob:
@@ -106,15 +114,12 @@ def _timing_job(setting: Setting, cell: Cell, store: Store) -> TimingJob:
     )
 
 
-def _record(request: RunRequest, setting: Setting, cell: Cell, result: Timings | Outcome) -> Record:
+def _record(setting: Setting, cell: Cell, result: Timings | Outcome, made: Provenance) -> Record:
     if isinstance(result, Outcome):
-        made = provenance(request.command, threads=request.limits.threads, wall_s=0.0, peak_rss_mb=0.0)
         return assemble.record_of(setting, cell, result, made)
-    made = provenance(
-        request.command,
-        threads=request.limits.threads,
-        wall_s=float(sum(values.sum() for values in result.durations_s.values())),
-        peak_rss_mb=result.facts.peak_memory_mb,
-    )
+    used = {
+        "wall_s": round(float(sum(values.sum() for values in result.durations_s.values())), 3),
+        "peak_rss_mb": round(result.facts.peak_memory_mb, 1),
+    }
     measurements = runtime_measurements(result, DEADLINE_FPS)
-    return assemble.record_of(setting, cell, Outcome("ok"), made, measurements=measurements)
+    return assemble.record_of(setting, cell, Outcome("ok"), made.model_copy(update=used), measurements=measurements)

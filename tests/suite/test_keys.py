@@ -19,8 +19,6 @@ class Mine(Adapter):
 
 
 def digest_of_file(path: Path) -> str:
-    keys._file_digest.cache_clear()
-    keys._own_imports.cache_clear()
     return keys.adapter_digest(find_adapter(source_from_option(str(path))))
 
 

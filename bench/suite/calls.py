@@ -1,0 +1,284 @@
+"""What runs on any machine: one cell, or the timing of one setting, as one picklable call of plain data.
+
+A call names what it needs by stage and key in the store and carries no data. Another machine may see the store, and
+have this project, at paths of its own: see :meth:`Home.here`. What a call makes it leaves in the store.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import platform
+import time
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from bench.suite.cell import FIT_ONLY, Job
+from bench.suite.provenance import ROOT, provenance
+from bench.suite.score import ScoreSpec, open_scorer, pin_threads
+from bench.suite.store import Store
+from bench.suite.timing import TimingJob, TimingPlan, time_adapters
+from bench.suite.timings import Timings
+from bench.suite.workers import Limits, Outcome, run_job
+from reports.records import Provenance, write_text_atomically
+
+STORE_VARIABLE = "STYLEBENCH_STORE"
+"""Environment variable of a worker machine: where it sees the store."""
+MOST_ATTEMPTS = 2
+VISIBLE_WITHIN_S = 60.0
+"""Shared folders show what another machine wrote only after a while."""
+REPORT_EVERY_S = 0.5
+
+Plain = TypeVar("Plain")
+Answered = TypeVar("Answered", covariant=True)
+
+
+class Call(Protocol[Answered]):
+    """Something to be done on some machine."""
+
+    def run(self) -> Answered:
+        """Do it, here."""
+        ...
+
+    def lost(self, reason: str) -> Answered:
+        """The answer where no machine lived through it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Home:
+    """Where the machine that makes the calls has its store and this project, and the folder of its run in the store."""
+
+    store: str
+    run: str
+    project: str = str(ROOT)
+
+    @property
+    def store_here(self) -> Path:
+        """The store as this machine sees it."""
+        return Path(os.environ.get(STORE_VARIABLE) or self.store)
+
+    def here(self, value: Plain) -> Plain:
+        """The same plain data with the caller's paths replaced by this machine's."""
+        found = value
+        for theirs, ours in ((self.store, str(self.store_here)), (self.project, str(ROOT))):
+            if theirs != ours:
+                found = _moved(found, theirs, ours)
+        return found
+
+
+def _moved(value: Any, theirs: str, ours: str) -> Any:
+    if isinstance(value, str):
+        return ours + value[len(theirs) :] if value == theirs or value.startswith(theirs + "/") else value
+    if isinstance(value, tuple):
+        return tuple(_moved(item, theirs, ours) for item in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{f.name: _moved(getattr(value, f.name), theirs, ours) for f in fields(value)})
+    return value
+
+
+class Attempt:
+    """One try at a call, claimed in the run's folder, so that a second one knows that the first was lost."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        self.progress_file = folder / f"{name}.progress"
+        self.lost: list[str] = []
+        self.last_report = 0.0
+        for number in itertools.count(1):
+            claim = folder / f"{name}.attempt-{number}"
+            try:
+                with claim.open("x") as file:
+                    file.write(worker_name())
+                return
+            except FileExistsError:
+                self.lost.append(claim.read_text() or "a worker")
+
+    @property
+    def too_many(self) -> bool:
+        return len(self.lost) >= MOST_ATTEMPTS
+
+    @property
+    def retried(self) -> str:
+        """Why this is not the first attempt; empty where it is."""
+        return f"the worker {', '.join(self.lost)} was lost; done again by {worker_name()}" if self.lost else ""
+
+    def report(self, what: str, done: int, total: int) -> None:
+        """Leave word of how far the call is."""
+        if time.monotonic() - self.last_report >= REPORT_EVERY_S:
+            self.last_report = time.monotonic()
+            draft = self.progress_file.with_suffix(f".{os.getpid()}")
+            draft.write_text(json.dumps([what, done, total]))
+            draft.replace(self.progress_file)
+
+
+def worker_name() -> str:
+    """This process, as records and messages name it."""
+    return f"{platform.node()}:{os.getpid()}"
+
+
+@dataclass(frozen=True)
+class CellAnswer:
+    """How a cell ended, what was made for it, and with what."""
+
+    outcome: Outcome
+    made: Provenance
+    generated: bool = False
+    scored: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CellCall:
+    """One cell: fit where needed, generate, score.
+
+    Attributes
+    ----------
+    name : unique among the calls of a run.
+    needs : what of the store it reads, as (stage, key).
+    job : with one cell.
+    spec : None where the method is only fitted.
+    given : see :class:`bench.suite.plan.Cell`.
+    logs : folder of logs.
+    """
+
+    name: str
+    home: Home
+    needs: tuple[tuple[str, str], ...]
+    job: Job
+    spec: ScoreSpec | None
+    given: bool
+    limits: Limits
+    logs: str
+    command: str
+
+    @property
+    def key(self) -> str:
+        return self.job.cells[0].key
+
+    def run(self) -> CellAnswer:
+        """Do what the store lacks; whatever goes wrong is the cell's outcome."""
+        call: CellCall = self.home.here(self)
+        return call._run_here()
+
+    def lost(self, reason: str) -> CellAnswer:
+        return self._answer(Outcome("failed", reason))
+
+    def _run_here(self) -> CellAnswer:
+        pin_threads(self.limits.threads)
+        attempt = Attempt(Path(self.home.run), self.name)
+        if attempt.too_many:
+            return self.lost(_lost_too_often(attempt.lost))
+        try:
+            answer = self._attempted(attempt)
+        except Exception as error:
+            answer = self._answer(_raised(error, Path(self.logs), f"{self.job.source.name}-scoring", "scoring"))
+        return replace(answer, made=answer.made.model_copy(update={"retried": attempt.retried}))
+
+    def _attempted(self, attempt: Attempt) -> CellAnswer:
+        store = Store(Path(self.job.store))
+        lacking = store.missing(self.needs, VISIBLE_WITHIN_S)
+        if lacking:
+            return self.lost(lacks(lacking, store))
+        stage = "fit" if self.job.cells[0].track == FIT_ONLY else "motions"
+        generated = not store.has(stage, self.key)
+        if generated:
+            outcome = self._worked(attempt)
+            if outcome.status != "ok":
+                return self._answer(outcome)
+        scored = open_scorer(self.spec).score(self.key, given=self.given) if self.spec else []
+        answer = self._answer(Outcome("ok"), store.facts(stage, self.key))
+        return replace(answer, generated=generated, scored=tuple(scored))
+
+    def _worked(self, attempt: Attempt) -> Outcome:
+        def listener(key: str, what: str, done: int, total: int) -> None:
+            attempt.report(f"{self.job.source.name}: {what}", done, total)
+
+        return _in_logs(run_job(self.job, Path(self.logs), limits=self.limits, listener=listener)[self.key])
+
+    def _answer(self, outcome: Outcome, facts: Mapping[str, Any] | None = None) -> CellAnswer:
+        return CellAnswer(outcome, made_here(self.command, self.limits.threads, facts or {}))
+
+
+@dataclass(frozen=True)
+class TimingAnswer:
+    """Timings or outcome by cell, and with what they were made."""
+
+    results: dict[str, Timings | Outcome]
+    made: Provenance
+
+
+@dataclass(frozen=True)
+class TimingCall:
+    """The timing of all cells of a setting: they take turns on one machine, or the comparison would not be fair."""
+
+    name: str
+    home: Home
+    jobs: tuple[TimingJob, ...]
+    plan: TimingPlan
+    limits: Limits
+    logs: str
+    command: str
+
+    def run(self) -> TimingAnswer:
+        """Time them, here and now; timings are never reused."""
+        call: TimingCall = self.home.here(self)
+        return call._run_here()
+
+    def lost(self, reason: str) -> TimingAnswer:
+        made = made_here(self.command, self.limits.threads, {})
+        return TimingAnswer({job.key: Outcome("failed", reason) for job in self.jobs}, made)
+
+    def _run_here(self) -> TimingAnswer:
+        attempt = Attempt(Path(self.home.run), self.name)
+        if attempt.too_many:
+            return self.lost(_lost_too_often(attempt.lost))
+        store = Store(Path(self.jobs[0].store))
+        fits = [("fit", job.fit_key) for job in self.jobs if job.fit_key]
+        packs = [("takes", Path(job.pack).name) for job in self.jobs]
+        lacking = store.missing([*dict.fromkeys(packs), *fits], VISIBLE_WITHIN_S)
+        if lacking:
+            return self.lost(lacks(lacking, store))
+        results = time_adapters(self.jobs, self.plan, Path(self.logs), limits=self.limits, progress=attempt.report)
+        results = {key: _in_logs(found) if isinstance(found, Outcome) else found for key, found in results.items()}
+        made = made_here(self.command, self.limits.threads, {})
+        return TimingAnswer(results, made.model_copy(update={"retried": attempt.retried}))
+
+
+def run_call(call: Call[Answered]) -> Answered:
+    """Entry point of worker processes."""
+    return call.run()
+
+
+def made_here(command: str, threads: int, facts: Mapping[str, Any]) -> Provenance:
+    """The provenance of what this process made; ``facts`` are those stored with it."""
+    return provenance(
+        command,
+        threads=threads,
+        wall_s=float(facts.get("wall_s", 0.0)),
+        peak_rss_mb=float(facts.get("peak_rss_mb", 0.0)),
+    )
+
+
+def lacks(lacking: Sequence[tuple[str, str]], store: Store) -> str:
+    """What is wrong with a store that lacks something, in one line."""
+    wanted = ", ".join(f"{stage}/{key}" for stage, key in lacking)
+    return f"the store of {worker_name()} at {store.root} lacks {wanted}"
+
+
+def _lost_too_often(lost: list[str]) -> str:
+    return f"its workers were lost: {', '.join(lost)}"
+
+
+def _in_logs(outcome: Outcome) -> Outcome:
+    return replace(outcome, log=f"logs/{outcome.log}") if outcome.log else outcome
+
+
+def _raised(error: Exception, logs: Path, name: str, what: str) -> Outcome:
+    """A row that cannot be scored is a record like any other failure: every other row goes on."""
+    log = logs / f"{name}.log"
+    write_text_atomically(log, "".join(traceback.format_exception(error)))
+    reason = f"{what} raised {type(error).__name__}: {error}"
+    return Outcome("failed", " ".join(reason.split())[:300], f"logs/{log.name}")
