@@ -12,7 +12,10 @@ from bench import __version__
 from bench.cli import app
 
 runner = CliRunner()
-COMMANDS = (["run"], ["list"], ["data", "info"], ["report"], ["leaderboard"], ["clean"])
+COMMANDS = (
+    ["run"], ["new-adapter"], ["check"], ["export-tasks"], ["score"], ["list"], ["data", "info"], ["report"],
+    ["leaderboard"], ["clean"],
+)  # fmt: skip
 
 
 def stylebench(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -46,7 +49,13 @@ def test_lists_as_table_and_json(what: str) -> None:
         (["list", "nothing"], "error: nothing called 'nothing' to list; remedy: choose from"),
         (["run", "--data", "nope"], "error: unknown dataset 'nope'; remedy: choose from procedural"),
         (["run", "--data", "bandai-namco=missing.zip"], "no such file or folder"),
+        (["run", "--protocols", "park2021@9"], "error: unknown protocol 'park2021@9'"),
         (["report", "nowhere"], "error: nowhere"),
+        (["new-adapter", "My Method"], "cannot name an adapter file"),
+        (["check", "nowhere.py"], "error: no file nowhere.py"),
+        (["export-tasks", "out", "--protocol", "nope@1"], "error: unknown protocol 'nope@1'"),
+        (["export-tasks", "out", "--labels", "actor"], "error: --labels: unknown label actor"),
+        (["score", "nowhere"], "nowhere"),
         (["leaderboard", "--records", "nowhere"], "error: no folder of records at nowhere"),
     ],
 )
@@ -67,3 +76,41 @@ def test_clean_removes_the_store_and_only_a_folder_of_runs(tmp_path: Path) -> No
     other.mkdir()
     result = stylebench("clean", "--all", "--runs", str(other), cwd=tmp_path)
     assert result.returncode == 2 and "does not look like a folder of runs" in result.stderr and other.is_dir()
+
+
+def test_a_new_adapter_is_not_written_over(tmp_path: Path) -> None:
+    first = stylebench("new-adapter", "mine", cwd=tmp_path)
+    assert first.stdout == "wrote mine.py; now: stylebench check mine.py\n"
+    outside = stylebench("new-adapter", "other", "--outside", cwd=tmp_path)
+    assert outside.stdout == "wrote other/adapter.toml; now: stylebench check other/adapter.toml\n"
+    again = stylebench("new-adapter", "mine", cwd=tmp_path)
+    assert again.returncode == 2 and "is already there" in again.stderr
+
+
+@pytest.mark.slow
+def test_from_nothing_to_a_checked_adapter(tmp_path: Path) -> None:
+    stylebench("new-adapter", "mine", cwd=tmp_path)
+    checked = stylebench("check", "mine.py", "--json", cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout
+    assert all(row["ok"] is not False for row in json.loads(checked.stdout))
+    text = (tmp_path / "mine.py").read_text()
+    (tmp_path / "bad.py").write_text(text.replace("def transfer(", "def transfer_(", 1))
+    bad = stylebench("check", "bad.py", cwd=tmp_path)
+    assert bad.returncode == 1 and "remedy" in bad.stderr
+
+
+@pytest.mark.slow
+def test_from_exported_tasks_to_a_row_without_code(tmp_path: Path) -> None:
+    assert stylebench("export-tasks", "out", "--profile", "smoke", "--motions", "npz", cwd=tmp_path).returncode == 0
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    incomplete = stylebench("score", "out", cwd=tmp_path)
+    assert incomplete.returncode == 2 and "60 of 60 answers are missing" in incomplete.stderr
+    for task in manifest["tasks"]:
+        content = tmp_path / "out" / task["content"]
+        (tmp_path / "out" / task["answer"]).write_bytes(content.read_bytes())
+    assert stylebench("check", "out", cwd=tmp_path).returncode == 0
+    scored = stylebench("score", "out", "--out", "run", cwd=tmp_path)
+    assert scored.returncode == 0, scored.stderr
+    assert "my method" in scored.stdout
+    [record] = [json.loads(path.read_text()) for path in (tmp_path / "run" / "records").glob("*.json")]
+    assert record["copies"] and record["method"]["trained_on"] == "not said"
