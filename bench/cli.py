@@ -67,6 +67,10 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<time>, and runs/latest.")] = None,
     store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
     jobs: Annotated[int, typer.Option(min=1, help="Cells at a time.")] = 2,
+    scheduler: Annotated[
+        str, typer.Option(help="Address of a Dask scheduler, or the file it wrote; runs cells on its workers.")
+    ] = "",
+    keep_failures: Annotated[bool, typer.Option(help="Do not try cells again that failed before.")] = False,
     seed: Annotated[int, typer.Option(help="Method seed.")] = 0,
     budget: Annotated[str, typer.Option(help="Training budget of methods that fit.")] = "small",
     split: Annotated[str, typer.Option(help="default, contiguous or interleaved.")] = "default",
@@ -93,6 +97,8 @@ def run(
         protocols=_names(protocols),
         profile=profile,
         jobs=jobs,
+        scheduler=scheduler,
+        keep_failures=keep_failures,
         seed=seed,
         budget=budget,
         split=split,
