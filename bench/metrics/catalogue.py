@@ -42,7 +42,7 @@ HEUSEL = "Heusel 2017, eq. 6"
 KERNEL = "Binkowski 2018, section 4"
 LOCALITY = "Motion Puzzle 2022, section 7.1, Table 1"
 HANDS = "Kuriyama 2022, section 4.2, eq. 13-16"
-ERD_TIME = "Style-ERD 2022, section 4.4, Table 2"
+ERD_TIME = "Style-ERD 2022, section 4.3, Table 2"
 MASON = "Mason 2022, section 4.3, eq. 5"
 MASON_TIME = "Mason 2022, Table 2"
 

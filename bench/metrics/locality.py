@@ -69,9 +69,11 @@ def joints_above(displacement: ArrayLike, threshold: float, virtual: Sequence[in
 
     Raises
     ------
-    BadInput : not one-dimensional, empty, not finite, negative; a joint index that does not exist.
+    BadInput : not one-dimensional, empty, not finite, negative; a joint index that does not exist; a threshold below 0.
     """
     values = _displacement(displacement)
+    if not (np.isfinite(threshold) and threshold >= 0.0):
+        raise BadInput(f"threshold must be at least 0 and finite, got {threshold}", where="threshold")
     real = ~_members(virtual, len(values), "virtual")
     return tuple(int(joint) for joint in np.flatnonzero(real & (values > threshold)))
 

@@ -188,3 +188,9 @@ def test_refuses_a_part_without_real_joints() -> None:
         leak_ratio(np.ones(3), ())
     with pytest.raises(BadInput, match="touched"):
         leak_ratio(np.ones(3), (1,), virtual=(1,))
+
+
+@pytest.mark.parametrize("threshold", [float("nan"), float("inf"), -0.1])
+def test_a_threshold_that_is_none_is_refused(threshold: float) -> None:
+    with pytest.raises(BadInput, match="threshold must be at least 0 and finite"):
+        joints_above([0.1, 0.2], threshold)
