@@ -246,6 +246,7 @@ class External(Adapter):
                 remedy=f"define {CAPABILITIES[lacks[0]] if lacks else 'fit, save and load'}, or correct adapter.toml",
             )
         session.heartbeat = answer.get("heartbeat") is True
+        session.says = one_line(str(answer.get("program", "")), 120)
 
     def _one(self, capability: str, content: Take, fields: dict[str, Any], rng: np.random.Generator) -> Clip:
         self._require(capability)

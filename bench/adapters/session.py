@@ -46,13 +46,21 @@ class OutOfTime(MethodFailed):
 
 
 class Session:
-    """A started program. Ends with :meth:`close`, with this object, or with this process, however that ends."""
+    """A started program. Ends with :meth:`close`, with this object, or with this process, however that ends.
+
+    Attributes
+    ----------
+    exchange : the folder through which motions travel.
+    heartbeat : whether the program promised signs of life.
+    says : what it told of itself: versions of its interpreter and libraries.
+    """
 
     def __init__(self, program: Program, *, log_fd: int = 2) -> None:
         self.program = program
         self.exchange = Path(tempfile.mkdtemp(prefix="stylebench-", dir=_exchange_parent()))
         self.program_exchange = Path(program.exchange_inside or self.exchange)
         self.heartbeat = False
+        self.says = ""
         self._last_id = -1
         self._abandoned: set[int] = set()
         self._buffer = b""
@@ -151,6 +159,10 @@ class Session:
             line = self._line(call, deadline)
             if line is None:
                 return None
+            if call == "hello" and not line.lstrip().startswith(b"{"):
+                # What activates an environment may print a banner before the program itself starts.
+                self._log_tail += line[:1000] + b"\n"
+                continue
             message = self._message(line, call)
             event = message.get("event")
             if event == "progress" and progress is not None and message["id"] == number:

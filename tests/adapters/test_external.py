@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -62,6 +63,7 @@ def test_outside_program_answers_and_leaves(folder: Path, shared_memory: Path) -
     np.testing.assert_allclose(answer.rotations_wxyz, content.clip.rotations_wxyz, atol=1e-12)
     np.testing.assert_array_equal(answer.root_xyz_m, content.clip.root_xyz_m)
     assert answer.skeleton is content.clip.skeleton
+    assert method.session().says == f"Python {platform.python_version()}, numpy {np.__version__}"
     assert left_behind(folder)
     method.close()
     check_nothing_is_left(folder, shared_memory)
@@ -336,6 +338,13 @@ def test_programs_that_break_the_protocol(folder: Path, shared_memory: Path, cod
     assert type(caught.value).__name__ in ("MethodFailed", "OutOfTime", "BadOutput", "BadFile")
     method.close()
     check_nothing_is_left(folder, shared_memory)
+
+
+def test_banner_before_hello_is_passed_over(folder: Path) -> None:
+    adapter = by_hand(folder, "say({'id': 1, 'ok': False, 'error': {'type': 'E', 'text': 'reached'}}); read()")
+    program = folder / "program.py"
+    program.write_text("print('activating the environment')\nprint()\n" + program.read_text())
+    fails(adapter, "transfer failed: E: reached")
 
 
 def test_program_of_another_protocol_is_refused(folder: Path, shared_memory: Path) -> None:

@@ -17,7 +17,7 @@ from tests.adapters.outside import COPY, content_take, rng, style_take, with_wor
 SOURCE = Path(worker.__file__)
 STANDARD = {
     "importlib", "inspect", "json", "os", "pathlib", "platform", "queue", "random", "shutil", "signal", "sys",
-    "threading", "time", "traceback", "typing",
+    "threading", "time", "traceback", "typing", "zipfile",
 }  # fmt: skip
 OLD_PYTHONS = ("3.7", "3.8", "3.9", "3.10", "3.12", "3.13", "3.14")
 
