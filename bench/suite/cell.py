@@ -1,7 +1,7 @@
 """The worker process: fits one adapter and generates the motions of its cells.
 
-Started as ``python -m bench.suite.cell JOB.json PIPE_FD``. Everything the method prints goes to the log that the parent
-made stdout and stderr; messages travel as JSON lines on their own pipe.
+Started as ``python -m bench.suite.cell JOB.json``. Messages travel as JSON lines on what was stdout at the start;
+everything the method prints goes to stderr, which is the log.
 """
 
 from __future__ import annotations
@@ -78,10 +78,15 @@ class Job:
 def main(arguments: list[str]) -> int:
     """Run a job; every outcome is a message, the exit code only says whether the worker itself lived."""
     threading.Thread(target=leave_with_parent, args=(os.getppid(),), daemon=True).start()
-    pipe = os.fdopen(int(arguments[1]), "w", buffering=1)
+    own = os.getpid()
+    line = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
 
     def send(message: dict[str, Any]) -> None:
-        pipe.write(json.dumps(message) + "\n")
+        # A method that forks and comes back must not report for its parent.
+        if os.getpid() != own:
+            os._exit(1)
+        line.write(json.dumps(message) + "\n")
 
     job = Job.read(Path(arguments[0]))
     try:

@@ -20,7 +20,7 @@ from bench.adapters.base import ProgressCallback
 from bench.arrays import FloatArray
 from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan, Turns, write_job
 from bench.suite.timings import TimingFacts, Timings
-from bench.suite.workers import POLL_S, Limits, Outcome, _death, _environment, _kill_group, tree_rss_mb
+from bench.suite.workers import POLL_S, Limits, Outcome, cause_of_death, kill_group, tree_rss_mb, worker_environment
 
 __all__ = ["TimingJob", "TimingPlan", "time_adapters"]
 
@@ -130,7 +130,7 @@ class _Member:
                     pass_fds=(their_input, their_output),
                     start_new_session=True,
                     # A fixed hash seed lays out the dictionaries of all processes alike.
-                    env=_environment(self.limits.threads) | {"PYTHONHASHSEED": "0"},
+                    env=worker_environment(self.limits.threads) | {"PYTHONHASHSEED": "0"},
                 )
         finally:
             os.close(their_input)
@@ -172,7 +172,7 @@ class _Member:
             if self.outcome is None:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     self.process.wait(LEAVE_S)
-            _kill_group(self.process)
+            kill_group(self.process)
 
     def result(self, companions: int) -> Timings | Outcome:
         """What the member came to."""
@@ -255,7 +255,7 @@ class _Member:
             code = self.process.wait(POLL_S * 20) if self.process else 1
         except subprocess.TimeoutExpired:
             return _Lost(Outcome("failed", "the worker closed its pipe", self.log.name))
-        return _Lost(Outcome("failed", _death(code), self.log.name))
+        return _Lost(Outcome("failed", cause_of_death(code), self.log.name))
 
 
 class _Group:

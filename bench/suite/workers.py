@@ -9,14 +9,17 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import psutil
 
+from bench.adapters.session import copy_log, end_guarded, start_guarded
 from bench.suite.cell import Job
 from reports.records import Status, write_text_atomically
 
@@ -24,6 +27,7 @@ Listener = Callable[[str, str, int, int], None]
 """Called as ``listener(cell key or 'fit', what, done, total)``."""
 
 POLL_S = 0.25
+GARBLED = "the method wrote into the line between worker and harness"
 
 
 @dataclass(frozen=True)
@@ -65,28 +69,33 @@ def run_job(job: Job, scratch: Path, *, limits: Limits, listener: Listener) -> d
 def _run_worker(job: Job, scratch: Path, log: Path, limits: Limits, listener: Listener) -> dict[str, Outcome]:
     job_file = scratch / f"{log.stem}.job.json"
     write_text_atomically(job_file, json.dumps(asdict(job)))
-    read_end, write_end = os.pipe()
-    try:
-        with log.open("wb") as log_file:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "bench.suite.cell", str(job_file), str(write_end)],
-                stdin=subprocess.DEVNULL,
-                stdout=log_file,
-                stderr=subprocess.STDOUT,
-                pass_fds=(write_end,),
-                start_new_session=True,
-                env=_environment(limits.threads),
-            )
-    finally:
-        os.close(write_end)
-    try:
-        return _Watch(job, process, log.name, limits, listener).until_end(read_end)
-    finally:
-        os.close(read_end)
-        _kill_group(process)
+    # Removed with all that is in it when the worker ends, however it ends.
+    own_folder = Path(tempfile.mkdtemp(prefix="stylebench-cell-"))
+    process, lifeline = start_guarded(
+        [sys.executable, "-m", "bench.suite.cell", str(job_file)],
+        own_folder,
+        working_folder=Path.cwd(),
+        environment=worker_environment(limits.threads) | {"TMPDIR": str(own_folder)},
+    )
+    messages, errors = descriptor(process.stdout), descriptor(process.stderr)
+    if process.stdin is not None:
+        process.stdin.close()
+    with log.open("wb") as log_file:
+        pump = threading.Thread(target=copy_log, args=(errors, log_file.fileno(), bytearray()), daemon=True)
+        pump.start()
+        try:
+            return _Watch(job, process, log.name, limits, listener).until_end(messages)
+        finally:
+            end_guarded(process, lifeline, pump)
 
 
-def _environment(threads: int) -> dict[str, str]:
+def descriptor(pipe: IO[bytes] | None) -> int:
+    """The file descriptor of a pipe; -1 where there is none."""
+    return -1 if pipe is None else pipe.fileno()
+
+
+def worker_environment(threads: int) -> dict[str, str]:
+    """This process's environment with the threads of all numerical libraries pinned."""
     pinned = {
         name: str(threads)
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -119,18 +128,32 @@ class _Watch:
                     break
                 *lines, buffer = (buffer + data).split(b"\n")
                 for line in lines:
-                    self._hear(json.loads(line))
+                    if not self._heard(line):
+                        self.outcomes[self.current] = Outcome("failed", GARBLED, self.log)
+                        return self.outcomes
+                if all(cell.key in self.outcomes for cell in self.job.cells):
+                    return self.outcomes
             verdict = self._over_limit()
             if verdict:
                 self.outcomes[self.current] = verdict
                 return self.outcomes
         code = self.process.wait()
         if code != 0 and self.current not in self.outcomes:
-            self.outcomes[self.current] = Outcome("failed", _death(code), self.log)
+            self.outcomes[self.current] = Outcome("failed", cause_of_death(code), self.log)
         return self.outcomes
+
+    def _heard(self, line: bytes) -> bool:
+        """Take in one message; False where it is none of the worker's own."""
+        try:
+            self._hear(json.loads(line))
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return False
+        return True
 
     def _hear(self, message: dict[str, Any]) -> None:
         key = str(message["cell"])
+        if key not in {"fit", *(cell.key for cell in self.job.cells)}:
+            raise KeyError(key)
         match message["event"]:
             case "begin":
                 self.current, self.since = key, time.monotonic()
@@ -167,13 +190,16 @@ def tree_rss_mb(pid: int) -> float:
     return total
 
 
-def _death(code: int) -> str:
-    if code < 0:
-        return f"the worker was killed by {signal.Signals(-code).name}"
+def cause_of_death(code: int) -> str:
+    """What an exit code says, as a guard passes it on: 128 + n where signal n ended the worker."""
+    number = -code if code < 0 else code - 128
+    if number in set(signal.Signals):
+        return f"the worker was killed by {signal.Signals(number).name}"
     return f"the worker ended with exit code {code}"
 
 
-def _kill_group(process: subprocess.Popen[bytes]) -> None:
+def kill_group(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process and all of its group."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
