@@ -27,6 +27,8 @@ class AdapterSource:
     name: str
     file: str = ""
     class_name: str = ""
+    broken: str = ""
+    """why it cannot be imported; empty where it can"""
 
 
 def available_adapters() -> dict[str, type[Adapter]]:

@@ -11,7 +11,8 @@ from bench.adapters.oracles import Oracle
 from bench.suite.keys import adapter_digest, fit_key, generate_key
 from bench.suite.setting import Setting
 from bench.suite.store import Store
-from reports.records import MethodFacts
+from bench.suite.workers import Outcome
+from reports.records import MethodFacts, digest_of
 
 SECONDS_PER_1000_SAMPLES = {"generate": 6.0, "score": 14.0}
 """Rough cost of a cell on one core, for ``--dry-run``; measured on the anchor rows."""
@@ -23,7 +24,7 @@ WHOLE_TAKE_FRAMES = 1600
 class Cell:
     """Method x protocol x dataset x seed: the unit that is run, cached, failed and resumed.
 
-    ``unsupported`` says why the cell cannot be run at all; empty where it can.
+    ``settled`` is the outcome where it is known before anything runs: not supported, or not to be imported.
     """
 
     source: AdapterSource
@@ -33,14 +34,26 @@ class Cell:
     fit_key: str
     motions_key: str
     given: bool
-    unsupported: str = ""
+    settled: Outcome | None = None
 
 
 def plan_cells(
     setting: Setting, sources: Sequence[AdapterSource], *, seed: int, budget: str, device: str
 ) -> list[Cell]:
     """The cells of a run, in the order of ``sources``."""
-    return [_cell(setting, source, find_adapter(source), seed, budget, device) for source in sources]
+    return [
+        _broken(source, seed, budget)
+        if source.broken
+        else _cell(setting, source, find_adapter(source), seed, budget, device)
+        for source in sources
+    ]
+
+
+def _broken(source: AdapterSource, seed: int, budget: str) -> Cell:
+    """The cell of an adapter that cannot be imported: a row that says so."""
+    facts = MethodFacts(name=source.name, title=source.name, kind="method", digest="")
+    key = digest_of({"not to be imported": source.name})
+    return Cell(source, facts, seed, budget, "", key, given=True, settled=Outcome("failed", source.broken))
 
 
 def _cell(setting: Setting, source: AdapterSource, adapter: type[Adapter], seed: int, budget: str, device: str) -> Cell:
@@ -54,7 +67,7 @@ def _cell(setting: Setting, source: AdapterSource, adapter: type[Adapter], seed:
         fit_key=fitted,
         motions_key=generate_key(fitted or digest, setting.tasks_digest, seed),
         given=not issubclass(adapter, Oracle),
-        unsupported=_unsupported(adapter, setting),
+        settled=Outcome("unsupported", reason) if (reason := _unsupported(adapter, setting)) else None,
     )
 
 
@@ -104,7 +117,7 @@ class Estimate:
 
 def estimate(setting: Setting, cells: Sequence[Cell], store: Store, jobs: int) -> Estimate:
     """Rough cost of what the store does not have yet."""
-    runnable = [cell for cell in cells if not cell.unsupported]
+    runnable = [cell for cell in cells if cell.settled is None]
     waiting = [cell for cell in runnable if not store.has("motions", cell.motions_key)]
     per_cell = len(setting.tasks) / 1000.0
     seconds = per_cell * sum(SECONDS_PER_1000_SAMPLES.values()) * len(waiting)

@@ -11,10 +11,12 @@ from pathlib import Path
 
 from bench.adapters import ADAPTERS
 from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
+from bench.adapters.probe import import_failure
 from bench.errors import BadConfig
 from bench.protocols import PROTOCOLS
 from bench.protocols.base import Protocol
 from bench.suite.workers import Limits
+from reports.records import write_text_atomically
 
 OWN_PROTOCOLS = {
     protocol.track: protocol
@@ -62,7 +64,7 @@ class RunRequest:
 
 
 def sources_of(request: RunRequest) -> list[AdapterSource]:
-    """The adapters of a run, named ones first checked for existence.
+    """The adapters of a run; files are imported in a process of their own first, and marked where that fails.
 
     Raises
     ------
@@ -72,13 +74,25 @@ def sources_of(request: RunRequest) -> list[AdapterSource]:
     sources = [AdapterSource(name) for name in names]
     for source in sources:
         find_adapter(source)
-    sources += [source_from_option(option) for option in request.adapter_files]
+    sources += [_source_of_file(option, request.out) for option in request.adapter_files]
     seen: set[str] = set()
     for source in sources:
         if source.name in seen:
             raise BadConfig(f"two adapters are called {source.name!r}", remedy="give yours another name")
         seen.add(source.name)
     return sources
+
+
+def _source_of_file(option: str, out: Path) -> AdapterSource:
+    path, _, class_name = option.partition(":")
+    if not Path(path).expanduser().is_file():
+        return source_from_option(option)
+    failure = import_failure(option)
+    if failure is None:
+        return source_from_option(option)
+    name = class_name or Path(path).stem
+    write_text_atomically(out / "logs" / f"{name}-import.log", failure.log)
+    return AdapterSource(name, path, class_name, failure.reason)
 
 
 def protocols_of(request: RunRequest) -> list[Protocol]:
@@ -117,9 +131,8 @@ def check_request(request: RunRequest) -> None:
 
     Raises
     ------
-    BadConfig : unknown names, or folders that cannot be written.
+    BadConfig : unknown protocols, or folders that cannot be written.
     """
-    sources_of(request)
     protocols_of(request)
     for option, folder in (("--out", request.out), ("--store", request.store)):
         _check_writable(folder, option)

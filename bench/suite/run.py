@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.adapters.loading import AdapterSource
 from bench.datasets.base import Dataset
 from bench.datasets.table import load_dataset
 from bench.errors import BadData
@@ -44,10 +45,11 @@ class Planned:
 def dry_run(request: RunRequest, progress: Progress) -> list[tuple[Setting, list[Cell], Estimate]]:
     """The cells of a run and what they would cost; loads the data, runs nothing."""
     check_request(request)
+    sources = sources_of(request)
     store = Store(request.store)
     plans = []
     for setting in _settings(request, _loaded(request, progress), store).settings:
-        cells = _cells(request, setting)
+        cells = _cells(request, setting, sources)
         plans.append((setting, cells, estimate(setting, cells, store, request.jobs)))
     return plans
 
@@ -60,6 +62,7 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     BenchError : a request that cannot be run; a failing method is a record, not an error.
     """
     check_request(request)
+    sources = sources_of(request)
     pin_threads(request.limits.threads)
     datasets = _loaded(request, progress)
     records: list[Record] = []
@@ -67,7 +70,7 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     with session_of(request, progress) as session:
         records_folder = fresh_records_folder(request.out)
         planned = _settings(request, datasets, session.store)
-        cells_of = [(setting, _cells(request, setting)) for setting in planned.settings]
+        cells_of = [(setting, _cells(request, setting, sources)) for setting in planned.settings]
         session.check_workers(cells_of)
         for setting, cells in cells_of:
             if setting.protocol.track == "runtime":
@@ -117,6 +120,11 @@ def _settings(request: RunRequest, datasets: Sequence[Dataset], store: Store) ->
     return Planned(tuple(settings), tuple(left_out))
 
 
-def _cells(request: RunRequest, setting: Setting) -> list[Cell]:
-    cells = plan_cells(setting, sources_of(request), seed=request.seed, budget=request.budget, device="cpu")
-    return [cell for cell in cells if not cell.unsupported or cell.facts.name in request.methods]
+def _cells(request: RunRequest, setting: Setting, sources: Sequence[AdapterSource]) -> list[Cell]:
+    cells = plan_cells(setting, sources, seed=request.seed, budget=request.budget, device="cpu")
+    return [cell for cell in cells if _is_a_row(cell, request)]
+
+
+def _is_a_row(cell: Cell, request: RunRequest) -> bool:
+    """What is not supported is shown only where it was asked for by name."""
+    return cell.settled is None or cell.settled.status != "unsupported" or cell.facts.name in request.methods

@@ -62,7 +62,7 @@ class Session:
         BadConfig : a machine lacks this code, the store, a dataset or an adapter.
         """
         datasets = {(setting.dataset.dataset_id, setting.pack_folder.name) for setting, _ in planned}
-        adapters = {(cell.source, cell.facts.digest) for _, cells in planned for cell in cells if not cell.unsupported}
+        adapters = {(cell.source, cell.facts.digest) for _, cells in planned for cell in cells if cell.settled is None}
         by_name = sorted(adapters, key=lambda item: item[0].name)
         self.workers.check(Wanted(self.home, code_digest(), tuple(sorted(datasets)), tuple(by_name)))
 

@@ -116,8 +116,8 @@ class SettingRun:
 
     def _known(self, cell: Cell) -> CellAnswer | None:
         """The answer of a cell that needs no work."""
-        if cell.unsupported:
-            return self._answer(Outcome("unsupported", cell.unsupported))
+        if cell.settled is not None:
+            return self._answer(cell.settled)
         if self.store.has("motions", cell.motions_key):
             facts = self.store.facts("motions", cell.motions_key)
             if not self.scorer.missing(str(facts["motions_digest"]), cell.given):

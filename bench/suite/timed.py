@@ -50,7 +50,7 @@ def time_cells(session: Session, setting: Setting, cells: Sequence[Cell], record
     if session.request.keep_failures:
         kept = {cell.motions_key: session.failures.recall(key) for key, cell in zip(keys, cells, strict=True)}
         results |= {key: outcome for key, outcome in kept.items() if outcome is not None}
-    results |= {cell.motions_key: Outcome("unsupported", cell.unsupported) for cell in cells if cell.unsupported}
+    results |= {cell.motions_key: cell.settled for cell in cells if cell.settled is not None}
     results |= _unfitted(session, setting, [cell for cell in cells if cell.motions_key not in results])
     jobs = [_timing_job(setting, cell, session.store) for cell in cells if cell.motions_key not in results]
     made = made_here(session.request.command, session.request.limits.threads, {})
