@@ -419,6 +419,7 @@ def test_cancelled_program_stays_and_answers_on(folder: Path) -> None:
     method.close()
 
 
+@pytest.mark.slow
 def test_heartbeats_tell_a_slow_program_from_a_hanging_one(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bench.adapters.external.HEARTBEAT_S", 0.2)
     code = """

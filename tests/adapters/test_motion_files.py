@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import tempfile
 import tracemalloc
 import zipfile
 from pathlib import Path
@@ -124,14 +125,13 @@ def test_damaged_bvh_raises_only_ours(edits: list[tuple[int, bytes]]) -> None:
         motion_of(bytes(content), ".bvh", CLIP, "x")
 
 
-def bvh_bytes(tmp: Path) -> bytes:
-    write_bvh(tmp, CLIP)
-    content = tmp.read_bytes()
-    tmp.unlink()
-    return content
+def bvh_bytes() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        write_bvh(Path(folder) / "clip.bvh", CLIP)
+        return (Path(folder) / "clip.bvh").read_bytes()
 
 
-BVH = bvh_bytes(Path(os.environ.get("TMPDIR", "/tmp")) / f"stylebench-test-{os.getpid()}.bvh")
+BVH = bvh_bytes()
 
 
 def test_bvh_answers_stand_on_the_contents_bones() -> None:
