@@ -21,7 +21,7 @@ from bench.adapters.program import Program, read_program
 from bench.adapters.session import HEARTBEAT_S, PROTOCOLS, Session, one_line
 from bench.arrays import FloatArray, finite_array
 from bench.datasets.take import Take
-from bench.errors import BadConfig, BadInput, BadOutput, MethodFailed
+from bench.errors import BadConfig, BadFile, BadInput, BadOutput, MethodFailed
 from bench.motion.bvh import write_bvh
 from bench.motion.clip import Clip
 from bench.motion.skeleton import CANONICAL_NAMES, CANONICAL_PARENTS
@@ -270,7 +270,11 @@ class External(Adapter):
             if name not in (f"{stem}.npz", f"{stem}.bvh"):
                 shown = one_line(str(name), 80)
                 raise BadOutput(f"expected the file {stem}.npz or {stem}.bvh, got {shown!r}", where=self.name)
-            clip = read_motion(self.session().exchange, name, source, max_frames=source.n_frames)
+            try:
+                clip = read_motion(self.session().exchange, name, source, max_frames=source.n_frames)
+            except BadFile as error:
+                # The protocol was kept; what was answered is not a motion.
+                raise BadOutput(error.problem, where=name, cause=error.cause, remedy=error.remedy) from None
             clips.append(checked_answer(clip, source, name) if check else clip)
         self._forget(names)
         return clips
