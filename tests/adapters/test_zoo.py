@@ -1,0 +1,165 @@
+"""A zoo of hostile adapters in one run: each bad row says why, and no good row notices."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from bench.suite.workers import Limits
+from reports.records import Record
+from tests.suite.conftest import undisturbed as undisturbed
+from tests.suite.tiny import METHODS, contents, tiny_run
+
+pytestmark = pytest.mark.slow
+
+HEAD = """
+import os, shutil, signal, subprocess, sys, tempfile, threading, time
+import numpy as np
+from bench.adapters.base import Adapter
+from bench.motion.clip import Clip
+from bench.motion.skeleton import Skeleton, canonical_skeleton
+
+class {name}(Adapter):
+    name = "{name}"
+    calls = 0
+
+    def transfer(self, content, style, *, rng):
+        clip = content.clip
+        self.calls += 1
+        rotations, root = clip.rotations_wxyz, clip.root_xyz_m
+{body}
+        return clip
+"""
+
+OPEN = """
+
+def _open(descriptor):
+    try:
+        os.fstat(descriptor)
+    except OSError:
+        return False
+    return True
+"""
+
+ZOO: dict[str, tuple[str, str, str]] = {
+    "CrashAtClip5": ("if self.calls == 5: raise RuntimeError('clip 5')", "failed", "RuntimeError: clip 5"),
+    "DiesAtClip5": ("if self.calls == 5: os._exit(7)", "failed", "exit code 7"),
+    "Segfaults": ("os.kill(os.getpid(), signal.SIGSEGV)", "failed", "killed by SIGSEGV"),
+    "InfiniteLoop": ("while True: pass", "timeout", "no answer within"),
+    "Sleeps": ("time.sleep(600)", "timeout", "no answer within"),
+    "Allocates2GB": ("self.kept = np.ones(2**28)\ntime.sleep(600)", "oom", "the limit is"),
+    "Leaks": ("self.kept = getattr(self, 'kept', []) + [np.ones(2**26)]\ntime.sleep(0.3)", "oom", "the limit is"),
+    "IsNaN": ("return clip.with_motion(rotations, root * np.nan)", "invalid", "must be finite"),
+    "IsInf": ("return clip.with_motion(rotations, root + np.inf)", "invalid", "must be finite"),
+    "WrongT": ("return clip.with_motion(rotations[:9], root[:9])", "invalid", "expected 64 frames, got 9"),
+    "WrongJ": (
+        "s = clip.skeleton\n"
+        "return Clip(Skeleton(s.names[:9], s.parents[:9], s.offsets_m[:9]), rotations[:, :9], root, clip.fps)",
+        "invalid", "skeleton: expected",
+    ),
+    "WrongFps": ("return Clip(clip.skeleton, rotations, root, 25.0)", "invalid", "expected 30 fps, got 25 fps"),
+    "Centimetres": ("return clip.with_motion(rotations, root * 100.0)", "invalid", "centimetres instead of metres"),
+    "Teleports": (
+        "root = root.copy()\nroot[30:, 0] += 5.0\nreturn clip.with_motion(rotations, root)", "invalid", "root path",
+    ),
+    "Stretches": (
+        "return Clip(canonical_skeleton(clip.skeleton.offsets_m * 1.1), rotations, root, clip.fps)", "invalid",
+        "bone lengths",
+    ),
+    "ReturnsNothing": ("return None", "invalid", "NoneType"),
+    "ClosesItsPipes": ("os.closerange(0, 256)", "failed", "worker"),
+    "Garbles": ("[os.write(fd, b'hello\\n') for fd in range(3, 64) if _open(fd)]", "failed", "line between worker"),
+}  # fmt: skip
+"""Name -> what it does in each call, the status it must get, and words of its reason."""
+
+HARMLESS = {
+    "Floods": "sys.stdout.write('x' * 10**6)\nsys.stderr.write('y' * 10**6)",
+    "Forks": "subprocess.Popen(['sleep', '600'], start_new_session=True)",
+    "ForksAndComesBack": "if os.fork() == 0: time.sleep(0.01)",
+    "IgnoresSigterm": "signal.signal(signal.SIGTERM, signal.SIG_IGN)",
+    "DeletesItsScratch": "shutil.rmtree(tempfile.gettempdir(), ignore_errors=True)",
+    "LeavesFiles": "tempfile.mkstemp()",
+    "LeavesThreads": "threading.Thread(target=time.sleep, args=(600,)).start()",
+}
+"""Rude, but each task is answered: the row is good, and nothing of the rest stays behind."""
+
+AT_IMPORT = {
+    "raises": ("raise OSError('no weights')", "OSError: no weights"),
+    "leaves": ("import os\nos._exit(3)", "ended without a word"),
+}
+LIMITS = Limits(wall_s=25.0, rss_mb=1500.0)
+
+
+def write_zoo(folder: Path) -> list[str]:
+    """One file per animal; returns the options that name them."""
+    animals = {name: body for name, (body, _, _) in ZOO.items()} | HARMLESS
+    for name, body in animals.items():
+        indented = "\n".join(f"        {line}" for line in body.splitlines())
+        (folder / f"{name}.py").write_text(HEAD.format(name=name, body=indented) + OPEN)
+    for name, (text, _) in AT_IMPORT.items():
+        (folder / f"{name}.py").write_text(text + "\n" + HEAD.format(name=name, body="        pass"))
+    return [str(path) for path in sorted(folder.glob("*.py"))]
+
+
+def descendants() -> set[int]:
+    return {process.pid for process in psutil.Process().children(recursive=True) if process.is_running()}
+
+
+def temporary_files() -> set[str]:
+    return {path.name for path in Path(tempfile.gettempdir()).glob("stylebench-*")}
+
+
+@pytest.fixture(scope="module")
+def visit(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Record], Path]:
+    """The records of one run with all animals, by method."""
+    folder = tmp_path_factory.mktemp("zoo")
+    (folder / "animals").mkdir()
+    options = tuple(write_zoo(folder / "animals"))
+    before, files = descendants(), temporary_files()
+    result = tiny_run(folder / "out", folder / "store", adapter_files=options, limits=LIMITS, jobs=2)
+    deadline = time.monotonic() + 10.0
+    while (descendants() - before or temporary_files() - files) and time.monotonic() < deadline:
+        time.sleep(0.2)
+    assert not [p for p in descendants() - before if "resource_tracker" not in " ".join(psutil.Process(p).cmdline())]
+    assert not temporary_files() - files
+    assert not [p for p in psutil.process_iter(["cmdline"]) if p.info["cmdline"] == ["sleep", "600"]]
+    return {record.method.name: record for record in result.records}, folder
+
+
+@pytest.mark.parametrize("name", ZOO)
+def test_bad_rows_say_why(name: str, visit: tuple[dict[str, Record], Path]) -> None:
+    records, folder = visit
+    _, status, words = ZOO[name]
+    assert (records[name].status, words in records[name].reason) == (status, True), records[name].reason
+    assert not records[name].measurements
+    assert (folder / "out" / records[name].log).is_file()
+
+
+@pytest.mark.parametrize("name", HARMLESS)
+def test_rude_rows_that_answer_are_scored(name: str, visit: tuple[dict[str, Record], Path]) -> None:
+    records, _ = visit
+    assert records[name].status == "ok", records[name].reason
+    assert records[name].motions_digest == records["copy-content"].motions_digest
+
+
+@pytest.mark.parametrize("name", AT_IMPORT)
+def test_what_cannot_be_imported_is_a_row(name: str, visit: tuple[dict[str, Record], Path]) -> None:
+    records, _ = visit
+    assert records[name].status == "failed" and AT_IMPORT[name][1] in records[name].reason
+
+
+def test_no_good_row_notices(visit: tuple[dict[str, Record], Path], undisturbed: Path) -> None:
+    records, folder = visit
+    assert {records[name].status for name in METHODS} == {"ok"}
+    alone, among = contents(undisturbed / "out"), contents(folder / "out")
+    assert {name: among[name] for name in alone} == alone
+
+
+def test_logs_are_bounded(visit: tuple[dict[str, Record], Path]) -> None:
+    _, folder = visit
+    sizes = {path.name: path.stat().st_size for path in (folder / "out" / "logs").iterdir()}
+    assert max(sizes.values()) < 20 * 2**20, sizes
