@@ -17,7 +17,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from bench.adapters.base import CAPABILITIES, Traits
 from bench.errors import BadConfig
@@ -26,10 +26,18 @@ MAX_TOML_BYTES = 65536
 EXCHANGE = "{exchange}"
 """Stands in ``command`` for the folder through which motions travel; containers mount it."""
 
+
+def _printable(text: str) -> str:
+    """Refuses what could break a line or turn its direction in a table."""
+    if not text.isprintable():
+        raise ValueError("must be one line of printable text")
+    return text
+
+
 Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._+-]{0,63}$")]
-Title = Annotated[str, Field(max_length=100)]
-Sentence = Annotated[str, Field(max_length=300)]
+Title = Annotated[str, Field(max_length=100), AfterValidator(_printable)]
+Sentence = Annotated[str, Field(max_length=300), AfterValidator(_printable)]
 
 
 class Table(BaseModel):
@@ -198,6 +206,9 @@ def traits_of(table: Any, where: str) -> Traits:
     for key in table:
         if key not in names:
             raise BadConfig(f"there is no trait {key[:60]!r}", where=where, remedy=_nearest(key, names))
+    for key, value in table.items():
+        if isinstance(value, str) and not (value.isprintable() and len(value) <= 300):
+            raise BadConfig("must be one line of printable text", where=f"{where}: traits.{key}")
     try:
         # By way of JSON, where strict types still let a table become a dataclass.
         return TypeAdapter(Traits).validate_json(json.dumps(table, default=str), strict=True)

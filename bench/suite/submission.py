@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from bench.adapters import ADAPTERS
 from bench.adapters.answers import CheckRow, check_answer, checked_answer
 from bench.adapters.base import ProgressCallback, Traits
 from bench.adapters.motion_files import npz_bytes, read_bounded, read_motion
@@ -272,9 +273,12 @@ def _entry(folder: Path) -> tuple[_Entry, Traits]:
     table = dict(parse_toml(read_bounded(folder, SUBMISSION, MAX_TOML_BYTES), where))
     traits = traits_of(table.pop("traits", {}), where)
     try:
-        return _Entry.model_validate(table), traits
+        entry = _Entry.model_validate(table)
     except ValidationError as error:
         raise bad_key(error, Path(where), [*_Entry.model_fields, "traits"]) from None
+    if entry.name in ADAPTERS:
+        raise BadConfig(f"there is a row {entry.name!r} already", where=where, remedy="choose another name")
+    return entry, traits
 
 
 def _answer_files(folder: Path, setting: Setting) -> list[tuple[Task, Clip, str]]:

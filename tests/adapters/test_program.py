@@ -57,6 +57,9 @@ def test_all_keys_arrive() -> None:
         ({"traits": {"needs_labels": True}}, "no trait 'needs_labels'"),
         ({"traits": {"needs_style_label": "no"}}, "traits.needs_style_label: Input should be a valid boolean"),
         ({"traits": 1}, "traits must be a table"),
+        ({"traits": {"trained_on": "a\nb"}}, "traits.trained_on: must be one line of printable text"),
+        ({"title": "a\u202eb"}, "title: Value error, must be one line of printable text"),
+        ({"description": "a\tb"}, "description: Value error, must be one line of printable text"),
         ({"toml_file": "/etc/passwd"}, "no key 'toml_file'"),
     ],
 )

@@ -211,6 +211,8 @@ def test_manifests_that_are_none(folder: Path, setting: Setting, content: bytes,
         ('name = "<b>x</b>"', "name: String should match pattern"),
         ('name = "x"\n[traits]\nuses_judges = true', "no trait 'uses_judges'; remedy: did you mean 'uses_judge'"),
         ("name = ", "is not TOML"),
+        ('name = "copy-content"', "there is a row 'copy-content' already"),
+        ('name = "x"\ntitle = "two\\nlines"', "title: Value error, must be one line"),
     ],
 )
 def test_submission_toml_is_checked(folder: Path, setting: Setting, text: str, match: str) -> None:
