@@ -11,6 +11,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from bench.errors import BadConfig
@@ -138,6 +139,10 @@ def _cluster(scheduler: str) -> Iterator[Workers]:
         ) from None
     connect: Any = distributed.Client
     place = {"scheduler_file": scheduler} if scheduler.endswith(".json") else {"address": scheduler}
+    if "scheduler_file" in place and not Path(scheduler).is_file():
+        raise BadConfig(
+            f"no file {scheduler}", where="--scheduler", remedy="'dask scheduler --scheduler-file' writes it"
+        )
     try:
         client = connect(**place, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -1,14 +1,16 @@
-"""A tiny benchmark in a process of its own: ``python -m tests.suite.tiny OUT STORE [METRIC=VERSION ...]``.
+"""A tiny benchmark in a process of its own: ``python -m tests.suite.tiny OUT STORE [SCHEDULER]``.
 
 Twelve samples, four anchors and two small judges, on a few takes that are made here; everything else is the real thing.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -46,8 +48,8 @@ def tiny_dataset() -> Dataset:
     return Dataset("tiny", "tiny@1", "tiny-1", tuple(takes), {c: c for c in CONTENTS}, "none", "this test")
 
 
-def tiny_run(out: Path, store: Path, versions: dict[str, int] | None = None) -> RunResult:
-    """Run the tiny benchmark; ``versions`` raises the versions of metrics."""
+def tiny_run(out: Path, store: Path, versions: dict[str, int] | None = None, **options: Any) -> RunResult:
+    """Run the tiny benchmark; ``versions`` raises the versions of metrics, ``options`` are those of the request."""
     DATASETS["tiny"] = DatasetEntry(lambda path, progress: tiny_dataset(), "tiny", "none", "none", needs_path=False)
     name = "stylebench-transfer@1"
     PROTOCOLS[name] = replace(PROTOCOLS[name], n_samples={"smoke": 12, "quick": 12, "standard": 12})
@@ -55,9 +57,23 @@ def tiny_run(out: Path, store: Path, versions: dict[str, int] | None = None) -> 
         METRICS[metric] = replace(METRICS[metric], version=version)
     quick = JudgeRecipe(TrainingConfig(n_steps=60), TrainingConfig(n_steps=20))
     judging.train_judges = partial(train_judges, seeds=(0,), recipe=quick)  # type: ignore[attr-defined]
-    request = RunRequest({"tiny": None}, out, store, METHODS, profile="smoke", jobs=1)
+    request = replace(RunRequest({"tiny": None}, out, store, METHODS, profile="smoke", jobs=1), **options)
     return run(request, lambda *_: None)
 
 
+def contents(out: Path) -> dict[str, Any]:
+    """Records without times, memory and host facts, and the arrays of the samples files, by file name."""
+    found: dict[str, Any] = {}
+    for path in sorted((out / "records").iterdir()):
+        if path.suffix == ".json":
+            record = json.loads(path.read_text())
+            del record["provenance"], record["log"]
+            found[path.name] = record
+        else:
+            with np.load(path, allow_pickle=False) as arrays:
+                found[path.name] = {name: arrays[name].tobytes() for name in arrays.files}
+    return found
+
+
 if __name__ == "__main__":
-    tiny_run(Path(sys.argv[1]), Path(sys.argv[2]), {k: int(v) for k, v in (a.split("=") for a in sys.argv[3:])})
+    tiny_run(Path(sys.argv[1]), Path(sys.argv[2]), scheduler="".join(sys.argv[3:]))
