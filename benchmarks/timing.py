@@ -20,9 +20,9 @@ from bench.adapters.loading import AdapterSource
 from bench.datasets.pack import write_pack
 from bench.datasets.procedural import load
 from bench.protocols.base import Task
-from bench.suite.timing import time_adapters
-from bench.suite.timing_plan import TimingJob, TimingPlan
-from bench.suite.timings import Timings
+from bench.suite.timing.harness import time_adapters
+from bench.suite.timing.plan import TimingJob, TimingPlan
+from bench.suite.timing.results import Timings
 from bench.suite.workers import Limits
 
 APART_TARGET_PERCENT, SLEEP_TARGET_PERCENT, OVERHEAD_TARGET_US = 3.0, 5.0, 20.0

@@ -21,8 +21,8 @@ from bench.suite.cell import FIT_ONLY, Job
 from bench.suite.provenance import ROOT, provenance
 from bench.suite.score import ScoreSpec, open_scorer, pin_threads
 from bench.suite.store import Store
-from bench.suite.timing import TimingJob, TimingPlan, time_adapters
-from bench.suite.timings import Timings
+from bench.suite.timing.harness import TimingJob, TimingPlan, time_adapters
+from bench.suite.timing.results import Timings
 from bench.suite.workers import Limits, Outcome, run_job
 from reports.records import Provenance, write_text_atomically
 

@@ -14,8 +14,8 @@ from bench.suite.scores.runtime import runtime_measurements
 from bench.suite.session import Session
 from bench.suite.setting import Setting
 from bench.suite.store import Store
-from bench.suite.timing import TimingJob, TimingPlan
-from bench.suite.timings import Timings
+from bench.suite.timing.harness import TimingJob, TimingPlan
+from bench.suite.timing.results import Timings
 from bench.suite.workers import Outcome
 from reports.records import Provenance, Record
 

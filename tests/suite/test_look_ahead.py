@@ -10,7 +10,7 @@ from bench.adapters.base import Adapter
 from bench.datasets.take import Take
 from bench.errors import MethodFailed
 from bench.motion.clip import Clip
-from bench.suite.look_ahead import measured_look_ahead
+from bench.suite.timing.look_ahead import measured_look_ahead
 from tests.motion.factory import random_clip
 
 CLIP = random_clip(64, seed=3)

@@ -8,8 +8,8 @@ import pytest
 from bench.metrics import METRICS
 from bench.metrics.catalogue import RUNTIME_METRICS
 from bench.suite.scores.runtime import NO_DESIGN, NO_TRANSFER, NOT_DESCRIBED, OUTSIDE, runtime_measurements
-from bench.suite.timing_plan import ONLINE
-from bench.suite.timings import Timings
+from bench.suite.timing.plan import ONLINE
+from bench.suite.timing.results import Timings
 from reports.records import Measurement
 from tests.suite.timings_factory import FACTS, timings
 

@@ -16,10 +16,10 @@ from bench.datasets.take import Take
 from bench.errors import BadConfig, BadOutput
 from bench.motion.clip import Clip
 from bench.motion.edit import crop
-from bench.suite.stopwatch import HostStopwatch, timed
-from bench.suite.timed_calls import repeated
-from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan, offline
-from bench.suite.timing_worker import TimingWorker, Unsupported, failure, loaded_adapter, memory_mb
+from bench.suite.timing.calls import repeated
+from bench.suite.timing.plan import ONLINE, TimingJob, TimingPlan, offline
+from bench.suite.timing.stopwatch import HostStopwatch, timed
+from bench.suite.timing.worker import TimingWorker, Unsupported, failure, loaded_adapter, memory_mb
 from tests.motion.factory import random_clip
 from tests.suite.timing_factory import SMALL, Ticker, calls_of, job_of, world
 
@@ -129,7 +129,7 @@ def test_the_clocks_of_this_machine_go_forward() -> None:
 
 
 def test_a_system_that_does_not_count_waiting_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.suite.stopwatch.SCHEDULER_STATISTICS", "/nowhere")
+    monkeypatch.setattr("bench.suite.timing.stopwatch.SCHEDULER_STATISTICS", "/nowhere")
     stopwatch = HostStopwatch()
     assert (stopwatch.knows_waiting, stopwatch.waited_ns()) == (False, 0)
 

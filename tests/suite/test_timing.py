@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from bench.adapters.loading import AdapterSource
 from bench.errors import BadFile
-from bench.suite.timing import time_adapters
-from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan, Turns, read_job, write_job
-from bench.suite.timings import ARRAYS_FILE, FACTS_FILE, Timings
+from bench.suite.timing.harness import time_adapters
+from bench.suite.timing.plan import ONLINE, TimingJob, TimingPlan, Turns, read_job, write_job
+from bench.suite.timing.results import ARRAYS_FILE, FACTS_FILE, Timings
 from bench.suite.workers import Limits, Outcome
 from tests.adapters.outside import COPY, left_behind, with_worker
 from tests.suite.timing_factory import SMALL, job_of, world, written

@@ -70,7 +70,8 @@ def test_good_adapter_leaves_motions(tmp_path: Path) -> None:
         ("return None", "invalid", "s0000: type: expected a bench.motion.clip.Clip, got builtins.NoneType"),
         ("return Clip(clip.skeleton, clip.rotations_wxyz[:9], clip.root_xyz_m[:9], 30.0)", "invalid",
          "s0000: frames: expected 64 frames, got 9"),
-        ("return Clip(clip.skeleton, clip.rotations_wxyz, clip.root_xyz_m, 60.0)", "invalid", "expected 30 fps, got 60 fps"),
+        ("return Clip(clip.skeleton, clip.rotations_wxyz, clip.root_xyz_m, 60.0)", "invalid",
+         "expected 30 fps, got 60 fps"),
         ("return clip.with_motion(clip.rotations_wxyz, clip.root_xyz_m * np.nan)", "invalid", "must be finite"),
         ("from bench.motion.skeleton import canonical_skeleton as c\n"
          "return Clip(c(clip.skeleton.offsets_m * 1.1), clip.rotations_wxyz, clip.root_xyz_m, 30.0)", "invalid",

@@ -10,8 +10,8 @@ from bench.adapters.loading import AdapterSource
 from bench.datasets.pack import write_pack
 from bench.datasets.take import Take
 from bench.protocols.base import Task
-from bench.suite.timed_calls import Calls, timed_inputs
-from bench.suite.timing_plan import TimingJob, TimingPlan
+from bench.suite.timing.calls import Calls, timed_inputs
+from bench.suite.timing.plan import TimingJob, TimingPlan
 from tests.motion.factory import random_clip
 
 HEAD = """

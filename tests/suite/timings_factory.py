@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.suite.timing_plan import ONLINE, TimingPlan, offline
-from bench.suite.timings import TimingFacts, Timings
+from bench.suite.timing.plan import ONLINE, TimingPlan, offline
+from bench.suite.timing.results import TimingFacts, Timings
 
 FACTS = TimingFacts(
     fps=30.0,

@@ -23,8 +23,8 @@ from bench.metrics.runtime import (
     startup_latency,
 )
 from bench.suite.scores.base import measure
-from bench.suite.timing_plan import ONLINE
-from bench.suite.timings import TimingFacts, Timings
+from bench.suite.timing.plan import ONLINE
+from bench.suite.timing.results import TimingFacts, Timings
 from reports.records import Measurement
 
 PER_CALL = ("latency_p50", "latency_p90", "latency_p99", "latency_max", "frames_per_second", "real_time_factor")

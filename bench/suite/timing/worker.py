@@ -1,4 +1,4 @@
-"""The process in which one adapter is timed, started as ``python -m bench.suite.timing_worker JOB.json FD_IN FD_OUT``.
+"""The process in which one adapter is timed, started as ``python -m bench.suite.timing.worker JOB.json FD_IN FD_OUT``.
 
 It loads the adapter, says so, and then answers one request at a time: while it waits, others compute. What the method
 prints goes to the log that the parent made stdout and stderr; messages travel as JSON lines on their own pipes.
@@ -25,11 +25,11 @@ from bench.adapters.external import External
 from bench.adapters.loading import find_adapter
 from bench.adapters.oracles import Oracle
 from bench.errors import BadConfig, BadMotion, BadOutput, BenchError
-from bench.suite.look_ahead import LookAhead, measured_look_ahead
-from bench.suite.stopwatch import HostStopwatch, Stopwatch, timed
 from bench.suite.store import Store
-from bench.suite.timed_calls import Calls, timed_inputs
-from bench.suite.timing_plan import TimingJob, TimingPlan, read_job
+from bench.suite.timing.calls import Calls, timed_inputs
+from bench.suite.timing.look_ahead import LookAhead, measured_look_ahead
+from bench.suite.timing.plan import TimingJob, TimingPlan, read_job
+from bench.suite.timing.stopwatch import HostStopwatch, Stopwatch, timed
 
 
 class Unsupported(BenchError):

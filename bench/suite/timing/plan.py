@@ -22,7 +22,7 @@ class TimingJob:
 
     Attributes
     ----------
-    key : names the job in what :func:`bench.suite.timing.time_adapters` returns.
+    key : names the job in what :func:`bench.suite.timing.harness.time_adapters` returns.
     pack : folder of stored takes, tasks_file : the tasks whose takes are the inputs.
     store, fit_key : where the fitted state lies; an empty key where nothing is fitted.
     seed : seeds the generator that every call is given anew.

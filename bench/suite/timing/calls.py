@@ -23,8 +23,8 @@ from bench.motion.clip import Clip
 from bench.motion.edit import crop, join, resample, windows
 from bench.protocols.base import Task
 from bench.suite.answering import checked
-from bench.suite.stopwatch import Stopwatch
-from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan
+from bench.suite.timing.plan import ONLINE, TimingJob, TimingPlan
+from bench.suite.timing.stopwatch import Stopwatch
 
 BLEND_S = 0.3
 """Blend at the joins of an input that is longer than its take."""

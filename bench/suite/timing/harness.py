@@ -18,8 +18,8 @@ import numpy as np
 
 from bench.adapters.base import ProgressCallback
 from bench.arrays import FloatArray
-from bench.suite.timing_plan import ONLINE, TimingJob, TimingPlan, Turns, write_job
-from bench.suite.timings import TimingFacts, Timings
+from bench.suite.timing.plan import ONLINE, TimingJob, TimingPlan, Turns, write_job
+from bench.suite.timing.results import TimingFacts, Timings
 from bench.suite.workers import POLL_S, Limits, Outcome, cause_of_death, kill_group, tree_rss_mb, worker_environment
 
 __all__ = ["TimingJob", "TimingPlan", "time_adapters"]
@@ -114,7 +114,7 @@ class _Member:
         command = [
             sys.executable,
             "-m",
-            "bench.suite.timing_worker",
+            "bench.suite.timing.worker",
             str(self.file),
             str(their_input),
             str(their_output),
