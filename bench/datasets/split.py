@@ -7,7 +7,7 @@ kernel distances are taken against; 40 / 30 / 15 / 15.
 from __future__ import annotations
 
 import hashlib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -20,6 +20,7 @@ from bench.motion.representation import window_frame
 PARTS = ("judge", "fit", "test", "real")
 KINDS = ("default", "contiguous", "interleaved")
 BLOCK_TAKES = 3
+SHOWN_LABELS = 5
 
 SEQUENCE = tuple({"J": "judge", "F": "fit", "T": "test", "R": "real"}[letter] for letter in "JFJTJFRJFJTJFRJFJTFR")
 """Dealing order of blocks: 8 judge, 6 fit, 3 test, 3 real, so spread that any four neighbours hold judge and fit."""
@@ -67,6 +68,12 @@ def deal(takes: Sequence[Take], *, kind: str = "default", seed: int = 0) -> Spli
     """
     if kind not in KINDS:
         raise BadConfig(f"unknown split kind {kind!r}, there are {', '.join(KINDS)}")
+    split = Split(kind, seed, _parts_by_cell(takes, kind, seed))
+    _check_every_label_in_every_part(takes, split)
+    return split
+
+
+def _parts_by_cell(takes: Sequence[Take], kind: str, seed: int) -> dict[str, str]:
     cells: dict[tuple[str, str], list[str]] = defaultdict(list)
     for take in takes:
         if take.content is None or take.style is None:
@@ -76,9 +83,7 @@ def deal(takes: Sequence[Take], *, kind: str = "default", seed: int = 0) -> Spli
     for cell, take_ids in sorted(cells.items()):
         start = _cell_hash(cell, seed) % len(SEQUENCE)
         part_of.update(zip(sorted(take_ids), _deal_cell(len(take_ids), kind, start), strict=True))
-    split = Split(kind, seed, part_of)
-    _check_every_label_in_every_part(takes, split)
-    return split
+    return part_of
 
 
 def _deal_cell(n_takes: int, kind: str, start: int) -> list[str]:
@@ -97,16 +102,49 @@ def _cell_hash(cell: tuple[str, str], seed: int) -> int:
 
 
 def _check_every_label_in_every_part(takes: Sequence[Take], split: Split) -> None:
+    lacking: list[str] = []
     for label in ("content", "style"):
-        all_labels = {getattr(take, label) for take in takes}
+        counts = Counter(str(getattr(take, label)) for take in takes)
         for part in PARTS:
-            missing = all_labels - {getattr(take, label) for take in split.select(takes, part)}
+            missing = sorted(set(counts) - {str(getattr(take, label)) for take in split.select(takes, part)})
             if missing:
-                raise BadData(
-                    f"the {part} part has no take of {label} {', '.join(sorted(missing))}",
-                    cause="too few takes of it: four parts need at least about 10 takes of every label",
-                    remedy="add takes, merge labels, or choose another split kind or seed",
-                )
+                named = ", ".join(f"{name} ({counts[name]} takes)" for name in missing[:SHOWN_LABELS])
+                more = f" and {len(missing) - SHOWN_LABELS} more" if len(missing) > SHOWN_LABELS else ""
+                lacking.append(f"the {part} part has no take of {label} {named}{more}")
+    if lacking:
+        needed = ", ".join(f"{takes_that_suffice(kind)} takes with {kind} dealing" for kind in KINDS)
+        raise BadData(
+            "; ".join(lacking),
+            cause="too few takes of a content in one style; all four parts are always reached by " + needed,
+            remedy=f"{_kinds_that_work(takes, split)}add takes, or merge labels",
+        )
+
+
+def _kinds_that_work(takes: Sequence[Take], failed: Split) -> str:
+    """Advice to take another kind of dealing, where one puts every label into every part."""
+    for kind in KINDS[::-1]:
+        part_of = _parts_by_cell(takes, kind, failed.seed)
+        reached = {(part_of[take.take_id], "content", take.content) for take in takes}
+        reached |= {(part_of[take.take_id], "style", take.style) for take in takes}
+        if len(reached) == len(PARTS) * len({label[1:] for label in reached}):
+            return f"take {kind} dealing (--split {kind}), or "
+    return ""
+
+
+def takes_that_suffice(kind: str) -> int:
+    """How many takes of one cell reach all four parts, wherever dealing starts.
+
+    Raises
+    ------
+    BadConfig : unknown kind.
+    """
+    if kind not in KINDS:
+        raise BadConfig(f"unknown split kind {kind!r}, there are {', '.join(KINDS)}")
+    starts = range(len(SEQUENCE))
+    n_takes = len(PARTS)
+    while any(set(_deal_cell(n_takes, kind, start)) != set(PARTS) for start in starts):
+        n_takes += 1
+    return n_takes
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bench.datasets import bandai_namco, procedural
+from bench.datasets import bandai_namco, bvh_folder, procedural
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
 from bench.errors import BadConfig, BadData
 
-DATASETS: dict[str, DatasetEntry] = {"procedural": procedural.ENTRY, "bandai-namco": bandai_namco.ENTRY}
+DATASETS: dict[str, DatasetEntry] = {
+    "procedural": procedural.ENTRY,
+    "bandai-namco": bandai_namco.ENTRY,
+    "bvh-folder": bvh_folder.ENTRY,
+}
 """Name on the command line -> how to load it."""
 
 

@@ -19,6 +19,7 @@ from bench.motion.bvh import BvhMotion, local_motion, world_motion
 from bench.motion.clip import Clip
 from bench.motion.skeleton import CANONICAL_NAMES, CANONICAL_PARENTS, Skeleton, canonical_skeleton
 from bench.motion.skeleton_maps import SkeletonMap
+from bench.motion.zero_pose import fitted
 
 _Z_TO_Y_UP = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), -np.pi / 2)
 OFFSET_TOLERANCE = 1e-3
@@ -43,6 +44,7 @@ def to_canonical(
     BadMotion : a mapped joint is missing, or the frame rate is not one of a motion.
     BadConfig : another ``up``, or a ``unit_m`` that is not positive.
     """
+    skeleton_map = _with_t_pose(bvh, skeleton_map)
     positions, rotations = _canonical_world(bvh, skeleton_map, unit_m, up)
     skeleton = _skeleton(bvh, skeleton_map, unit_m)
     local = rotations.copy()
@@ -55,9 +57,25 @@ def folding_error_m(
     bvh: BvhMotion, clip: Clip, skeleton_map: SkeletonMap, *, unit_m: float, up: str = "y"
 ) -> FloatArray:
     """Distance ``[F, 21]`` in metres between a retargeted clip's joints and the source's; NaN for virtual joints."""
-    positions, _ = _canonical_world(bvh, skeleton_map, unit_m, up)
+    positions, _ = _canonical_world(bvh, _with_t_pose(bvh, skeleton_map), unit_m, up)
     error: FloatArray = np.linalg.norm(kinematics.world_positions(clip) - positions, axis=-1)
     return error
+
+
+def rest_stature(bvh: BvhMotion, skeleton_map: SkeletonMap) -> float:
+    """Rest height of Head over the lower toe in file units.
+
+    Raises
+    ------
+    BadMotion : a mapped joint is missing, or the skeleton does not stand.
+    """
+    return _skeleton(bvh, _with_t_pose(bvh, skeleton_map), 1.0).stature_m
+
+
+def _with_t_pose(bvh: BvhMotion, skeleton_map: SkeletonMap) -> SkeletonMap:
+    """The map with the T-pose rotations of this file's joints."""
+    _source_indices(bvh, skeleton_map)
+    return fitted(bvh, _bones(bvh), skeleton_map) if skeleton_map.zero_pose else skeleton_map
 
 
 def _canonical_world(

@@ -44,6 +44,8 @@ class SkeletonMap:
     t_pose_wxyz : source joint -> its world rotation ``[4]`` in the canonical T-pose; identity if not listed. Joints
         that have no canonical counterpart count too: they place the joints below them.
     virtual_offsets_m : canonical name -> ``[3]`` T-pose offset of a virtual joint from its canonical parent, metres.
+    zero_pose : True where all rotations zero is a standing pose, from which ``t_pose_wxyz`` is read file by file (see
+        :mod:`bench.motion.zero_pose`).
 
     Raises
     ------
@@ -54,6 +56,7 @@ class SkeletonMap:
     joints: Mapping[str, str]
     t_pose_wxyz: Mapping[str, FloatArray] = field(default_factory=dict)
     virtual_offsets_m: Mapping[str, Direction] = field(default_factory=dict)
+    zero_pose: bool = False
 
     def __post_init__(self) -> None:
         listed = [*self.joints, *self.virtual_offsets_m]
@@ -74,7 +77,7 @@ def turn(axis: Direction, degrees: float) -> FloatArray:
     return quat.from_axis_angle(np.asarray(axis), np.radians(degrees))
 
 
-def _pitched(degrees: float, sign: float) -> Direction:
+def pitched(degrees: float, sign: float) -> Direction:
     """``sign`` times the forward direction tipped down by ``degrees``."""
     return (0.0, -sign * float(np.sin(np.radians(degrees))), sign * float(np.cos(np.radians(degrees))))
 
@@ -119,12 +122,12 @@ BANDAI_NAMCO = SkeletonMap(
         "Hand_R": _RIGHT_ARM,
         "UpperLeg_L": axes(x=DOWN, y=LEFT),
         "LowerLeg_L": axes(x=DOWN, y=LEFT),
-        "Foot_L": axes(x=_pitched(40.0, 1.0), y=LEFT),
-        "Toes_L": axes(x=_pitched(22.0, 1.0), y=LEFT),
+        "Foot_L": axes(x=pitched(40.0, 1.0), y=LEFT),
+        "Toes_L": axes(x=pitched(22.0, 1.0), y=LEFT),
         "UpperLeg_R": axes(x=UP, y=LEFT),
         "LowerLeg_R": axes(x=UP, y=LEFT),
-        "Foot_R": axes(x=_pitched(40.0, -1.0), y=LEFT),
-        "Toes_R": axes(x=_pitched(22.0, -1.0), y=LEFT),
+        "Foot_R": axes(x=pitched(40.0, -1.0), y=LEFT),
+        "Toes_R": axes(x=pitched(22.0, -1.0), y=LEFT),
     },
     virtual_offsets_m={"LeftHandIndex1": (_FINGER_M, 0.0, 0.0), "RightHandIndex1": (-_FINGER_M, 0.0, 0.0)},
 )

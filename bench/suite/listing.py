@@ -10,7 +10,7 @@ from bench.adapters.loading import available_adapters
 from bench.datasets.base import Dataset
 from bench.datasets.split import PARTS, deal, leak
 from bench.datasets.table import DATASETS
-from bench.errors import BadConfig
+from bench.errors import BadConfig, BadData
 from bench.metrics import METRICS
 from bench.protocols import PROTOCOLS
 
@@ -61,9 +61,6 @@ def describe_dataset(dataset: Dataset) -> dict[str, str]:
     frames = np.array([take.clip.n_frames for take in dataset.takes])
     seconds = float(sum(take.clip.duration_s for take in dataset.takes))
     statures = sorted({round(take.clip.skeleton.stature_m, 2) for take in dataset.takes})
-    split = deal(dataset.takes)
-    leaked = leak(dataset.takes, split)
-    counts = Counter(split.part_of.values())
     return {
         "dataset": dataset.dataset_id,
         "source": dataset.source or "generated",
@@ -72,15 +69,27 @@ def describe_dataset(dataset: Dataset) -> dict[str, str]:
         "frames": f"{frames.sum()} ({frames.min()} to {frames.max()} a take, median {int(np.median(frames))})",
         "minutes": f"{seconds / 60.0:.1f}",
         "fps": ", ".join(str(fps) for fps in sorted({take.clip.fps for take in dataset.takes})),
-        "joints": f"21, {len(dataset.takes[0].clip.skeleton.virtual)} of them virtual",
+        "joints": f"21, virtual: {', '.join(sorted(dataset.takes[0].clip.skeleton.virtual)) or 'none'}",
         "stature of Head over Toes, m": f"{statures[0]} to {statures[-1]}",
         "judged contents": ", ".join(dataset.content_labels),
         "styles": ", ".join(dataset.style_labels),
-        "default split": ", ".join(f"{part} {counts[part]}" for part in PARTS),
-        "leak": f"nearest neighbour in judge or fit: {leaked.share:.0%} of test takes, {leaked.chance:.0%} by chance",
+        **_describe_split(dataset),
         "licence": dataset.licence,
         "citation": dataset.citation,
         "notes": "; ".join(dataset.notes) or "none",
+    }
+
+
+def _describe_split(dataset: Dataset) -> dict[str, str]:
+    try:
+        split = deal(dataset.takes)
+    except BadData as error:
+        return {"default split": f"cannot be dealt: {error}"}
+    leaked = leak(dataset.takes, split)
+    counts = Counter(split.part_of.values())
+    return {
+        "default split": ", ".join(f"{part} {counts[part]}" for part in PARTS),
+        "leak": f"nearest neighbour in judge or fit: {leaked.share:.0%} of test takes, {leaked.chance:.0%} by chance",
     }
 
 
