@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,9 @@ def write_pack(folder: Path, takes: Sequence[Take]) -> None:
     (folder / LABELS_FILE).write_text(json.dumps({"skeletons": stored_skeletons, "takes": rows}))
 
 
+RECENT_TAKES = 256
+
+
 @dataclass(frozen=True, eq=False)
 class Pack:
     """Stored takes; a take's arrays are read only when it is asked for."""
@@ -85,7 +89,14 @@ class Pack:
         return cls(rotations, root, {row["take_id"]: row for row in labels["takes"]}, skeletons)
 
     def take(self, take_id: str) -> Take:
-        """One take with all its labels."""
+        """One take with all its labels; those asked for last are kept."""
+        return self._recent(take_id)
+
+    @cached_property
+    def _recent(self) -> Callable[[str], Take]:
+        return lru_cache(maxsize=RECENT_TAKES)(self._read)
+
+    def _read(self, take_id: str) -> Take:
         row = self.rows[take_id]
         frames = slice(row["start"], row["start"] + row["n_frames"])
         skeleton = self.skeletons[row["skeleton"]]
