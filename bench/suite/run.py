@@ -68,10 +68,10 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     records: list[Record] = []
     generated = scored = 0
     with session_of(request, progress) as session:
-        records_folder = fresh_records_folder(request.out)
         planned = _settings(request, datasets, session.store)
         cells_of = [(setting, _cells(request, setting, sources)) for setting in planned.settings]
         session.check_workers(cells_of)
+        records_folder = fresh_records_folder(request.out)
         for setting, cells in cells_of:
             if setting.protocol.track == "runtime":
                 records.extend(time_cells(session, setting, cells, records_folder))

@@ -61,6 +61,8 @@ class Session:
         ------
         BadConfig : a machine lacks this code, the store, a dataset or an adapter.
         """
+        if not self.request.scheduler:
+            return
         datasets = {(setting.dataset.dataset_id, setting.pack_folder.name) for setting, _ in planned}
         adapters = {(cell.source, cell.facts.digest) for _, cells in planned for cell in cells if cell.settled is None}
         by_name = sorted(adapters, key=lambda item: item[0].name)

@@ -1,48 +1,40 @@
-"""A tiny benchmark that is killed, repeated and changed: what is stored is never lost, repeated or half-read."""
+"""A tiny benchmark that is killed, repeated, changed and moved: what is stored is never lost, repeated or half-read."""
 
 from __future__ import annotations
 
-import json
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
-import numpy as np
+import psutil
 import pytest
 
+from bench.suite.output import write_report
 from bench.suite.run import RunResult
-from tests.suite.tiny import METHODS, tiny_run
+from tests.suite.tiny import METHODS, contents, tiny_run
 
 pytestmark = pytest.mark.slow
 
-N_KILLS = 10
+N_KILLS = 20
+MOODY = """
+from pathlib import Path
+from bench.adapters.base import Adapter
 
+class Moody(Adapter):
+    name = "moody"
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a finished run in ``out`` and its ``store``."""
-    folder = tmp_path_factory.mktemp("undisturbed")
-    result = tiny_run(folder / "out", folder / "store")
-    assert result.generated == len(METHODS) and [r.status for r in result.records] == ["ok"] * len(METHODS)
-    return folder
-
-
-def contents(out: Path) -> dict[str, Any]:
-    """Records without times, memory and host facts, and the arrays of the samples files, by file name."""
-    found: dict[str, Any] = {}
-    for path in sorted((out / "records").iterdir()):
-        if path.suffix == ".json":
-            record = json.loads(path.read_text())
-            del record["provenance"], record["log"]
-            found[path.name] = record
-        else:
-            with np.load(path, allow_pickle=False) as arrays:
-                found[path.name] = {name: arrays[name].tobytes() for name in arrays.files}
-    return found
+    def transfer(self, content, style, *, rng):
+        folder = Path(__file__).parent
+        if not (folder / "good mood").exists():
+            with (folder / "refused").open("a") as file:
+                file.write("x")
+            raise ValueError("not today")
+        return content.clip
+"""
 
 
 def again(folder: Path, name: str, versions: dict[str, int] | None = None) -> RunResult:
@@ -55,34 +47,103 @@ def test_a_second_run_does_nothing_and_says_the_same(undisturbed: Path) -> None:
     assert contents(undisturbed / "second") == contents(undisturbed / "out")
 
 
-def test_a_new_metric_version_recomputes_that_metric_alone(undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_metric_version_recomputes_that_metric_alone(
+    undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from bench.metrics import METRICS
 
     monkeypatch.setitem(METRICS, "cra", METRICS["cra"])
-    result = again(undisturbed, "version", {"cra": 2})
+    shutil.copytree(undisturbed / "store", tmp_path / "store")
+    result = again(tmp_path, "version", {"cra": 2})
     assert (result.generated, result.scored) == (0, len(METHODS))
 
 
-def test_from_scratch_gives_the_same_numbers(undisturbed: Path, tmp_path: Path) -> None:
-    tiny_run(tmp_path / "out", tmp_path / "store")
-    assert contents(tmp_path / "out") == contents(undisturbed / "out")
+def test_a_moved_run_goes_on(undisturbed: Path, tmp_path: Path) -> None:
+    """All but two cells are there; nothing that is there is done again, wherever it now lies."""
+    shutil.copytree(undisturbed, tmp_path / "runs")
+    motions = sorted((tmp_path / "runs" / "store" / "motions").iterdir())
+    for folder in motions[:2]:
+        shutil.rmtree(folder)
+    (tmp_path / "elsewhere").mkdir()
+    moved = (tmp_path / "runs").rename(tmp_path / "elsewhere" / "moved")
+    result = again(moved, "out")
+    assert (result.generated, result.scored) == (2, 0)
+    assert contents(moved / "out") == contents(undisturbed / "out")
+
+
+def test_failures_are_tried_again_unless_kept(undisturbed: Path, tmp_path: Path) -> None:
+    shutil.copytree(undisturbed / "store", tmp_path / "store")
+    file = tmp_path / "moody.py"
+    file.write_text(MOODY)
+
+    def run(*, keep_failures: bool) -> tuple[RunResult, str, str]:
+        result = tiny_run(tmp_path / "out", tmp_path / "store", adapter_files=(str(file),), keep_failures=keep_failures)
+        assert [record.status for record in result.records[:-1]] == ["ok"] * len(METHODS)
+        return result, result.records[-1].status, result.records[-1].reason
+
+    first, status, reason = run(keep_failures=True)
+    assert (first.generated, status, reason) == (0, "failed", "ValueError: not today")
+    assert (tmp_path / "out" / first.records[-1].log).is_file()
+    assert run(keep_failures=False)[1:] == ("failed", "ValueError: not today")
+    (tmp_path / "good mood").touch()
+    kept, status, reason = run(keep_failures=True)
+    assert (status, reason) == ("failed", "ValueError: not today")
+    assert (tmp_path / "out" / kept.records[-1].log).is_file()
+    assert (tmp_path / "refused").read_text() == "xx"
+    second, status, _ = run(keep_failures=False)
+    assert (second.generated, status) == (1, "ok")
+    assert run(keep_failures=True)[1] == "ok"
+
+    file.write_text(MOODY.replace("return content.clip", "return content.clip  # changed"))
+    changed, status, _ = run(keep_failures=False)
+    assert (changed.generated, changed.scored, status) == (1, 0, "ok")
 
 
 def test_killed_runs_resume_and_end_the_same(undisturbed: Path, tmp_path: Path) -> None:
-    """SIGKILL at random moments; finished work is kept, nothing half-written is ever read."""
-    command = [sys.executable, "-m", "tests.suite.tiny", str(tmp_path / "out"), str(tmp_path / "store")]
-    moments = random.Random(0)
-    for _ in range(N_KILLS):
-        process = subprocess.Popen(command)
+    """SIGKILL for the main process or one that it started, at random moments; finished work stays as it is."""
+    out, store = tmp_path / "out", tmp_path / "store"
+    command = [sys.executable, "-m", "tests.suite.tiny", str(out), str(store)]
+    chance = random.Random(0)
+    finished: dict[Path, int] = {}
+    main = subprocess.Popen(command)
+    kills = 0
+    while kills < N_KILLS:
         try:
-            process.wait(timeout=moments.uniform(2.0, 12.0))
+            assert main.wait(timeout=chance.uniform(0.5, 10.0)) == 0
+            lives = False
         except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGKILL)
-            process.wait()
+            kills += 1
+            lives = _lives_on(main, chance)
+        if not lives:
+            main = subprocess.Popen(command)
+        now = {path.parent: path.stat().st_mtime_ns for path in store.glob("*/*/done.json")}
+        assert finished.items() <= now.items()
+        finished = now
+    assert main.wait() == 0
     assert subprocess.run(command, check=False).returncode == 0
-    assert contents(tmp_path / "out") == contents(undisturbed / "out")
-    assert list((tmp_path / "store" / "tmp").iterdir()) == []
+
+    assert contents(out) == contents(undisturbed / "out")
+    assert results(store) == results(undisturbed / "store")
+    assert list((store / "tmp").iterdir()) == []
+    shutil.copytree(undisturbed / "out", tmp_path / "undisturbed")
+    assert write_report(out) == write_report(tmp_path / "undisturbed")
     _wait_for_orphans(str(tmp_path))
+
+
+def _lives_on(main: subprocess.Popen[bytes], chance: random.Random) -> bool:
+    """Kill the main process or, as often, one of those it started; True where the main process lives."""
+    workers = psutil.Process(main.pid).children(recursive=True)
+    if workers and chance.random() < 0.5:
+        chance.choice(workers).kill()
+        return True
+    main.send_signal(signal.SIGKILL)
+    main.wait()
+    return False
+
+
+def results(store: Path) -> set[tuple[str, str]]:
+    """Stage and key of everything in a store."""
+    return {(path.parent.parent.name, path.parent.name) for path in store.glob("*/*/done.json")}
 
 
 def _wait_for_orphans(marker: str) -> None:
