@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench import __version__, console
+from bench.data_commands import data_app
 from bench.errors import BadConfig, BenchError
 
 if TYPE_CHECKING:
@@ -93,6 +94,7 @@ def run(
         store=store,
         methods=_names(methods),
         adapter_files=tuple(adapter or ()),
+        only_files=bool(against and adapter),
         tracks=_names(tracks) or (() if protocols else ("transfer",)),
         protocols=_names(protocols),
         profile=profile,
@@ -133,8 +135,8 @@ def new_adapter(
     from bench.adapters.scaffold import write_new_adapter, write_new_program
 
     path = (write_new_program if outside else write_new_adapter)(name, Path.cwd())
-    target = path / "adapter.toml" if outside else path
-    console.say(f"wrote {path.name}; now: stylebench check {target.relative_to(Path.cwd())}")
+    shown = path.relative_to(Path.cwd())
+    console.say(f"wrote {shown}; now: stylebench check {shown}")
 
 
 @app.command()
@@ -153,7 +155,9 @@ def check(
     from bench.suite.submission import check_submission
     from bench.suite.submit import exported_setting
 
-    folder = Path(target)
+    folder, file = Path(target), Path(target.partition(":")[0])
+    if file.suffix in (".py", ".toml") and not file.is_file():
+        raise BadConfig(f"no file {file}", remedy="give FILE.py, FILE.py:Class, FOLDER/adapter.toml or a folder")
     if folder.is_dir():
         with console.ProgressDisplay() as progress:
             rows = list(check_submission(folder, exported_setting(folder, _data(data), store, progress)))
@@ -253,32 +257,7 @@ def list_(
         console.show_rows(headers, rows)
 
 
-data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(data_app, name="data")
-
-
-@data_app.command()
-def info(
-    name: Annotated[str, typer.Argument(help="NAME or NAME=PATH")],
-    as_json: Annotated[bool, typer.Option("--json")] = False,
-) -> None:
-    """Print counts, durations, split and licence of a dataset.
-
-    Example: stylebench data info bandai-namco=bandai.zip
-    """
-    from bench.datasets.table import load_dataset
-    from bench.suite.listing import dataset_table, describe_dataset
-
-    [(dataset_name, path)] = _data_options([name]).items()
-    with console.ProgressDisplay() as progress:
-        dataset = load_dataset(dataset_name, path, lambda what, done, total: progress("data", what, done, total))
-    facts = describe_dataset(dataset)
-    if as_json:
-        console.say_json(facts)
-        return
-    for key, value in facts.items():
-        console.say(f"{key}: {value}")
-    console.show_rows(*dataset_table(dataset), title="takes by content and style")
 
 
 @app.command()

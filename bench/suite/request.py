@@ -33,8 +33,9 @@ class RunRequest:
     Attributes
     ----------
     data : dataset name -> path (None for generated data).
-    methods : names; empty means all anchors and fast methods that fit the dataset.
-    adapter_files : ``FILE.py[:Class]`` each, run beside the methods.
+    methods : names; empty means all anchors and fast methods that fit the dataset, unless ``only_files``.
+    adapter_files : ``FILE.py[:Class]`` or ``adapter.toml`` each, run beside the methods.
+    only_files : without ``methods``, run nothing but the adapter files: their rows will stand beside others.
     tracks : our own protocol of each of these tracks.
     protocols : labels in PROTOCOLS, run beside the tracks; a name without a condition means all of its conditions.
     profile : ``quick`` or ``standard``.
@@ -49,6 +50,7 @@ class RunRequest:
     store: Path
     methods: tuple[str, ...] = ()
     adapter_files: tuple[str, ...] = ()
+    only_files: bool = False
     tracks: tuple[str, ...] = ("transfer",)
     protocols: tuple[str, ...] = ()
     profile: str = "quick"
@@ -70,7 +72,7 @@ def sources_of(request: RunRequest) -> list[AdapterSource]:
     ------
     BadConfig : an unknown name or file.
     """
-    names = request.methods or tuple(ADAPTERS)
+    names = request.methods or (() if request.only_files else tuple(ADAPTERS))
     sources = [AdapterSource(name) for name in names]
     for source in sources:
         find_adapter(source)

@@ -66,3 +66,14 @@ def test_defaults_are_all_anchors_on_the_transfer_track(tmp_path: Path) -> None:
     names = [source.name for source in sources_of(request(tmp_path))]
     assert "label-oracle" in names and "classify-and-retrieve" in names
     assert [protocol.track for protocol in protocols_of(request(tmp_path))] == ["transfer"]
+
+
+def test_beside_other_rows_only_the_new_one_is_run(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from bench.adapters.base import Adapter\n\nclass Mine(Adapter):\n    name = 'mine'\n"
+        "    def transfer(self, content, style, *, rng):\n        return content.clip\n"
+    )
+    alone = request(tmp_path, adapter_files=(str(file),), only_files=True)
+    assert [source.name for source in sources_of(alone)] == ["mine"]
+    assert len(sources_of(request(tmp_path, adapter_files=(str(file),)))) > 10
