@@ -105,6 +105,28 @@ def channel_digest(motion: BvhMotion) -> str:
     return hashlib.blake2b(motion.channel_values.astype("<f8").tobytes(), digest_size=16).hexdigest()
 
 
+def check_takes(path: Path) -> Iterator[tuple[str, PublishedTake | None, BvhMotion | BenchError | None]]:
+    """Every take that is published or found: its name, its published row, and what its file holds.
+
+    The row is None for a take that is not in the published subset; the motion is None where there is no file, and the
+    reader's refusal where the file cannot be read.
+
+    Raises
+    ------
+    BadData, BadFile : as :func:`load`.
+    """
+    files, published = _files(path), published_takes()
+    with _opened(path, files) as content_of:
+        for name in sorted({*files, *published}):
+            motion: BvhMotion | BenchError | None = None
+            if name in files:
+                try:
+                    motion = read_bvh(content_of(name), name=f"{name}.bvh")
+                except BenchError as error:
+                    motion = error
+            yield name, published.get(name), motion
+
+
 def _left_out(n: int) -> list[str]:
     return [f"{n} takes beyond the published subset are left out"] if n else []
 

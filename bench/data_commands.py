@@ -1,0 +1,114 @@
+"""``stylebench data``: look at datasets and motion files. Each command calls one function."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bench import console
+from bench.errors import BadConfig
+
+data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True, rich_markup_mode=None)
+
+JSON_OPTION = typer.Option("--json", help="Print as JSON.")
+
+
+@data_app.command()
+def info(
+    name: Annotated[str, typer.Argument(help="NAME or NAME=PATH")],
+    as_json: Annotated[bool, JSON_OPTION] = False,
+) -> None:
+    """Print counts, durations, split and licence of a dataset.
+
+    Example: stylebench data info bandai-namco=bandai.zip
+    """
+    from bench.datasets.table import load_dataset
+    from bench.suite.listing import dataset_table, describe_dataset
+
+    dataset_name, path = _named_path(name)
+    with console.ProgressDisplay() as progress:
+        dataset = load_dataset(dataset_name, path, lambda what, done, total: progress("data", what, done, total))
+    facts = describe_dataset(dataset)
+    if as_json:
+        console.say_json(facts)
+        return
+    for key, value in facts.items():
+        console.say(f"{key}: {value}")
+    console.show_rows(*dataset_table(dataset), title="takes by content and style")
+
+
+@data_app.command()
+def verify(
+    name: Annotated[str, typer.Argument(help="NAME=PATH")],
+    write_manifest: Annotated[
+        bool, typer.Option("--write-manifest", help="Write down what is there now, to compare with later.")
+    ] = False,
+    as_json: Annotated[bool, JSON_OPTION] = False,
+) -> None:
+    """Name files of a dataset that are changed, missing, extra or truncated.
+
+    Example: stylebench data verify bandai-namco=bandai.zip
+    """
+    from bench.datasets import verify as verifying
+
+    dataset_name, path = _named_path(name)
+    if path is None:
+        raise BadConfig("needs the copy to verify", remedy=f"stylebench data verify {dataset_name}=PATH")
+    if write_manifest:
+        console.say(f"wrote {verifying.write_manifest(path)}")
+        return
+    verdict = verifying.verify(dataset_name, path)
+    if as_json:
+        console.say_json([vars(finding) for finding in verdict.findings])
+    elif verdict.findings:
+        rows = [[finding.state, finding.file, finding.detail] for finding in verdict.findings]
+        console.show_rows(["state", "file", "detail"], rows, title=f"compared with {verdict.against}")
+    else:
+        console.say(f"{verdict.compared} files, all as they should be, compared with {verdict.against}")
+    if verdict.findings:
+        raise typer.Exit(1)
+
+
+@data_app.command()
+def fetch(name: Annotated[str, typer.Argument(help="NAME")]) -> None:
+    """Say how to obtain a dataset and where to put it.
+
+    Example: stylebench data fetch 100style
+    """
+    from bench.datasets.table import how_to_place
+
+    console.say(how_to_place(_named_path(name)[0]))
+
+
+@data_app.command()
+def skeleton(
+    file: Annotated[Path, typer.Argument(help="A BVH file.")],
+    joint_map: Annotated[str, typer.Option("--map", help="Known skeleton, or your own map as FILE.toml.")] = "",
+    unit: Annotated[str, typer.Option(help="m, cm, mm, inch, cmu, or metres per file unit.")] = "",
+    up: Annotated[str, typer.Option(help="y or z.")] = "",
+    fps: Annotated[float, typer.Option(help="Frames per second, instead of the frame time.")] = 0.0,
+    as_json: Annotated[bool, JSON_OPTION] = False,
+) -> None:
+    """Show how the joints of a file are understood: matched, virtual, missing; and unit, up axis and stature.
+
+    Example: stylebench data skeleton walk.bvh
+    """
+    from bench.suite.skeleton_report import skeleton_report
+
+    options: dict[str, str | float] = {"skeleton": joint_map, "unit": unit, "up": up, "fps": fps}
+    report = skeleton_report(file, {name: value for name, value in options.items() if value})
+    if as_json:
+        console.say_json({"facts": report.facts, "joints": report.joints})
+    else:
+        for key, value in report.facts.items():
+            console.say(f"{key}: {value}")
+        console.show_rows(["canonical joint", "state", "joint of the file"], report.joints)
+    if not report.complete:
+        raise typer.Exit(1)
+
+
+def _named_path(option: str) -> tuple[str, Path | None]:
+    name, has_path, path = option.partition("=")
+    return name, Path(path).expanduser() if has_path else None

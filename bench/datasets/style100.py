@@ -1,0 +1,166 @@
+"""100STYLE (Mason et al. 2022): 100 styles x 8 gaits of one actor on the 28 joints of Xsens, 60 fps, centimetres.
+
+A file ``Style_GAIT.bvh`` is one long recording; ``Frame_Cuts.csv`` says which frames of it count, as half-open ranges.
+A take is a piece of ``PIECE_S`` seconds of that range, ids in recording order.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+
+from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
+from bench.datasets.bvh_files import LabelledFile, bvh_places, read_takes
+from bench.errors import BadData
+from bench.motion.bvh import BvhMotion
+from bench.motion.clip import Clip
+from bench.motion.known_skeletons import XSENS
+from bench.motion.retarget import to_canonical
+
+NAME = "100style"
+GAITS = {
+    "BR": "backwards running",
+    "BW": "backwards walking",
+    "FR": "forwards running",
+    "FW": "forwards walking",
+    "ID": "idling",
+    "SR": "sidesteps running",
+    "SW": "sidesteps walking",
+    "TR1": "transitions",
+    "TR2": "transitions",
+    "TR3": "transitions",
+}
+CUTS_CSV = "Frame_Cuts.csv"
+PUBLISHED_FILES, PUBLISHED_STYLES, PUBLISHED_FRAMES = 810, 100, 4_055_978
+"""Mason et al. 2022, Table 1; the frames are the sum of STOP - START over Frame_Cuts.csv."""
+PUBLISHED_TRANSITION_FRAMES = 786_818
+UNIT_M, PIECE_S = 0.01, 8.0
+LICENCE = "CC BY 4.0, to be confirmed on the page of the dataset"
+CITATION = (
+    "Mason, Starke, Komura 2022, Real-Time Style Modelling of Human Locomotion via Feature-Wise Transformations and "
+    "Local Motion Phases, PACMCGIT 5(1)"
+)
+HOW_TO_GET = "download 100STYLE from https://www.ianxmason.com/100style/, unpack it and give the folder"
+_FILE = re.compile(rf"(?P<style>[A-Za-z0-9]+)_(?P<gait>{'|'.join(GAITS)})")
+
+Cuts = Mapping[tuple[str, str], tuple[int, int]]
+"""Style and gait -> half-open range of frames."""
+
+
+def read_cuts(path: Path) -> dict[tuple[str, str], tuple[int, int]]:
+    """``Frame_Cuts.csv``: a row a style, columns STYLE_NAME and GAIT_START, GAIT_STOP; N/A where there is no recording.
+
+    Raises
+    ------
+    BadData : unreadable, no STYLE_NAME, or a range that is none; starts with ``file:line``.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadData(f"cannot be read ({error})", where=str(path), remedy=HOW_TO_GET) from error
+    reader = csv.DictReader(lines)
+    if "STYLE_NAME" not in (reader.fieldnames or ()):
+        raise BadData("has no column STYLE_NAME", where=f"{path}:1", cause="not the file as published")
+    cuts: dict[tuple[str, str], tuple[int, int]] = {}
+    for row in reader:
+        for gait in GAITS:
+            start, stop = (str(row.get(f"{gait}_{end}") or "N/A").strip() for end in ("START", "STOP"))
+            if "N/A" in (start, stop):
+                continue
+            if not (start.isdigit() and stop.isdigit() and int(start) < int(stop)):
+                raise BadData(f"{gait} from {start!r} to {stop!r} is no range", where=f"{path}:{reader.line_num}")
+            cuts[row["STYLE_NAME"].strip(), gait] = (int(start), int(stop))
+    return cuts
+
+
+def check_totals(cuts: Cuts) -> list[str]:
+    """What is wrong with the frame cuts of a full set, against the published totals; empty where all agrees."""
+    frames = sum(stop - start for start, stop in cuts.values())
+    transitions = sum(stop - start for (_, gait), (start, stop) in cuts.items() if gait.startswith("TR"))
+    found = (
+        ("recordings", len(cuts), PUBLISHED_FILES),
+        ("styles", len({style for style, _ in cuts}), PUBLISHED_STYLES),
+        ("frames", frames, PUBLISHED_FRAMES),
+        ("transition frames", transitions, PUBLISHED_TRANSITION_FRAMES),
+    )
+    return [
+        f"{count} {what} in {CUTS_CSV}, {published} published" for what, count, published in found if count != published
+    ]
+
+
+def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
+    """Read a folder, at any depth; ``Frame_Cuts.csv`` must be in it.
+
+    Raises
+    ------
+    BadData : no path, no file of the dataset, no frame cuts, or a full set whose totals are not the published ones.
+    BadFile : files that cannot be read.
+    """
+    if path is None:
+        raise BadData("it is read from your copy, and no path is given", where=NAME, remedy=HOW_TO_GET)
+    places = bvh_places(path)
+    cuts = read_cuts(find_cuts(path))
+    files: list[LabelledFile] = []
+    for place in places:
+        found = _FILE.fullmatch(PurePosixPath(place).stem)
+        if found and (found["style"], found["gait"]) in cuts:
+            frames = cuts[found["style"], found["gait"]]
+            files.append(LabelledFile(place, GAITS[found["gait"]], found["style"], frames=frames))
+    if not files:
+        raise BadData(f"no file is called like Angry_FW.bvh; the first is {places[0]}", where=str(path))
+    full = len(files) >= PUBLISHED_FILES
+    wrong = check_totals(cuts) if full else []
+    if wrong:
+        raise BadData("; ".join(wrong), where=str(path), cause="not the frame cuts as published", remedy=HOW_TO_GET)
+    facts = {"skeleton": XSENS.name, "unit_m": UNIT_M}
+    takes, digest = read_takes(path, files, _to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
+    left = len(places) - len(files)
+    return Dataset(
+        name=NAME,
+        dataset_id=f"{NAME}-local",
+        digest=digest,
+        takes=takes,
+        judged_content={content: content for content in sorted({file.content for file in files})},
+        licence=LICENCE,
+        citation=CITATION,
+        source=path.name,
+        notes=(
+            "frame totals agree with the published ones" if full else f"{len(files)} of {PUBLISHED_FILES} recordings",
+            f"recordings are cut into takes of {PIECE_S:g} s",
+            "fingers are virtual",
+            *[f"{left} BVH files are not in {CUTS_CSV} and left out"] * bool(left),
+        ),
+    )
+
+
+def find_cuts(folder: Path) -> Path:
+    """Where ``Frame_Cuts.csv`` lies in a folder.
+
+    Raises
+    ------
+    BadData : nowhere.
+    """
+    found = sorted(folder.rglob(CUTS_CSV))
+    if not found:
+        raise BadData(f"there is no {CUTS_CSV} in it", where=str(folder), remedy=f"{CUTS_CSV} comes with the dataset")
+    return found[0]
+
+
+def expected_files(folder: Path) -> set[str]:
+    """File names that the folder's frame cuts speak of."""
+    return {f"{style}_{gait}.bvh" for style, gait in read_cuts(find_cuts(folder))}
+
+
+def _to_clip(bvh: BvhMotion) -> Clip:
+    return to_canonical(bvh, XSENS, unit_m=UNIT_M)
+
+
+ENTRY = DatasetEntry(
+    load=load,
+    summary="captured locomotion: 8 gaits x 100 styles of one actor, 60 fps; read from your copy",
+    licence=LICENCE,
+    citation=CITATION,
+    how_to_get=HOW_TO_GET,
+)

@@ -1,0 +1,158 @@
+"""Xia et al. 2015 (8 styles, 31 CMU joints, 120 fps), under any of the three naming schemes in which it goes round.
+
+``angry_13_000.bvh``: style, number of the action (1 to 28), repetition: as processed by Aberman et al. 2020.
+``angry_fast_punching_003.bvh``: style, action, number. ``fast punching_angry_03.bvh``: action with spaces, style,
+number, perhaps ``_m`` for a mirrored copy (Park et al. 2021), which is left out.
+
+Contents are the six of the papers; fast and normal walking are one, fast and plain punching are one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath
+
+from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
+from bench.datasets.bvh_files import LabelledFile, bvh_places, read_takes
+from bench.errors import BadData
+from bench.motion.bvh import BvhMotion
+from bench.motion.clip import Clip
+from bench.motion.retarget import to_canonical
+from bench.motion.skeleton_maps import CMU_31, CMU_UNIT_M
+
+NAME = "xia2015"
+STYLES = ("angry", "childlike", "depressed", "neutral", "old", "proud", "sexy", "strutting")
+ACTIONS = {
+    "fast punching": "punching",
+    "fast walking": "walking",
+    "jumping": "jumping",
+    "kicking": "kicking",
+    "normal walking": "walking",
+    "punching": "punching",
+    "running": "running",
+    "transitions": "transitions",
+}
+"""Action in a file name -> content."""
+PUBLISHED_FILES = 572
+TEST_PER_CELL = {"walking": 3, "running": 1, "jumping": 1, "kicking": 1, "punching": 1, "transitions": 0}
+"""Aberman et al. 2020: how many files of each style and content, first by name, are the test set: 56 files."""
+LICENCE = "not stated by its publishers; ask the authors before redistribution"
+CITATION = (
+    "Xia, Wang, Chai, Hodgins 2015, Realtime Style Transfer for Unlabeled Heterogeneous Human Motion, ACM TOG 34(4)"
+)
+HOW_TO_GET = (
+    "get the BVH files from the authors' page, or as processed from "
+    "https://github.com/DeepMotionEditing/deep-motion-editing, and give their folder"
+)
+_STYLE = "|".join(STYLES)
+_BY_NUMBER = re.compile(rf"(?P<style>{_STYLE})_(?P<id>\d{{1,2}})(?:_\d+)?")
+_BY_ACTION = re.compile(rf"(?P<style>{_STYLE})_(?P<action>[a-z]+(?:_[a-z]+)?)_\d+")
+_WITH_SPACES = re.compile(rf"(?P<action>[a-z]+(?: [a-z]+)?)_(?P<style>{_STYLE})_\d+(?P<mirrored>_m)?")
+_LAST_NUMBER = (
+    (12, "walking"),
+    (15, "running"),
+    (17, "jumping"),
+    (21, "punching"),
+    (23, "kicking"),
+    (28, "transitions"),
+)
+
+
+def content_of_number(number: int) -> str:
+    """Content of an action number: 1-12 walking, 13-15 running, 16-17 jumping, 18-21 punching, 22-23 kicking, else
+    transitions (deep-motion-editing's list).
+
+    Raises
+    ------
+    BadData : not 1 to 28.
+    """
+    for last, content in _LAST_NUMBER:
+        if 1 <= number <= last:
+            return content
+    raise BadData(f"action numbers are 1 to 28, got {number}", where=NAME)
+
+
+def labels_of(stem: str) -> tuple[str, str] | None:
+    """Content and style of a file name without ``.bvh``; None where it is none of the dataset, or a mirrored copy.
+
+    Raises
+    ------
+    BadData : an action number that does not exist.
+    """
+    lower = stem.lower()
+    found = _BY_NUMBER.fullmatch(lower)
+    if found:
+        return content_of_number(int(found["id"])), found["style"]
+    found = _BY_ACTION.fullmatch(lower)
+    if found is None:
+        found = _WITH_SPACES.fullmatch(lower)
+        if found is None or found["mirrored"]:
+            return None
+    content = ACTIONS.get(found["action"].replace("_", " "))
+    return (content, found["style"]) if content else None
+
+
+def aberman_test_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Names (without ``.bvh``) that Aberman et al. 2020 test on: the first few of each style and content by name."""
+    cells: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for name in sorted(names):
+        labels = labels_of(name)
+        if labels is not None:
+            cells[labels].append(name)
+    chosen = [name for (content, _), found in cells.items() for name in found[: TEST_PER_CELL[content]]]
+    return tuple(sorted(chosen))
+
+
+def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
+    """Read a folder, at any depth.
+
+    Raises
+    ------
+    BadData : no path, or no file of the dataset.
+    BadFile : files that cannot be read.
+    """
+    if path is None:
+        raise BadData("it is read from your copy, and no path is given", where=NAME, remedy=HOW_TO_GET)
+    places = bvh_places(path)
+    files: list[LabelledFile] = []
+    for place in places:
+        labels = labels_of(PurePosixPath(place).stem)
+        if labels is not None:
+            files.append(LabelledFile(place, *labels))
+    if not files:
+        raise BadData(
+            f"no file is called like angry_13_000.bvh; the first is {places[0]}", where=str(path), remedy=HOW_TO_GET
+        )
+    facts = {"skeleton": CMU_31.name, "unit_m": CMU_UNIT_M}
+    takes, digest = read_takes(path, files, _to_clip, facts, dataset=NAME, progress=progress)
+    left = len(places) - len(files)
+    return Dataset(
+        name=NAME,
+        dataset_id=f"{NAME}-local",
+        digest=digest,
+        takes=takes,
+        judged_content={content: content for content in sorted({file.content for file in files})},
+        licence=LICENCE,
+        citation=CITATION,
+        source=path.name,
+        notes=(
+            f"{len(files)} files; the papers name {PUBLISHED_FILES}",
+            "unit 5.6444 cm and Y up, as known of these files",
+            *[f"{left} files are mirrored copies or no files of the dataset, and left out"] * bool(left),
+        ),
+    )
+
+
+def _to_clip(bvh: BvhMotion) -> Clip:
+    return to_canonical(bvh, CMU_31, unit_m=CMU_UNIT_M)
+
+
+ENTRY = DatasetEntry(
+    load=load,
+    summary="captured motion: 6 contents x 8 styles, 572 short takes at 120 fps; read from your copy",
+    licence=LICENCE,
+    citation=CITATION,
+    how_to_get=HOW_TO_GET,
+)

@@ -1,0 +1,97 @@
+"""ZeroEGGS (Ghorbani et al. 2022): 67 monologues of one actress in 19 styles, 75 joints, 60 fps.
+
+Files are called ``001_Neutral_0.bvh``, in the cleaned set ``001_Neutral_0_x_1_0.bvh``; mirrored copies and copies at
+another speed do not count. A take is a piece of ``PIECE_S`` seconds. All content is speech, so there is one content and
+nothing for a content judge to tell apart: this is data for the gesture track.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path, PurePosixPath
+
+from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
+from bench.datasets.bvh_files import LabelledFile, bvh_places, read_motion, read_takes
+from bench.errors import BadData
+from bench.motion.bvh import BvhMotion
+from bench.motion.clip import Clip
+from bench.motion.known_skeletons import ZEROEGGS
+from bench.motion.recognise import UNITS_M, guess_unit
+from bench.motion.retarget import rest_stature, to_canonical
+
+NAME = "zeroeggs"
+CONTENT, PIECE_S = "speech", 8.0
+PUBLISHED_FILES, PUBLISHED_MINUTES = 67, 134.65
+LICENCE = "CC BY-NC-ND 4.0"
+CITATION = "Ghorbani et al. 2022, ZeroEGGS: Zero-shot Example-based Gesture Generation from Speech, arXiv 2209.07556"
+HOW_TO_GET = (
+    "get Zeggs_data.zip, .z01 and .z02 from https://github.com/ubisoft/ubisoft-laforge-ZeroEGGS (git lfs), unpack the "
+    "three as one archive and give the folder 'clean' or 'original'"
+)
+_FILE = re.compile(r"(?P<number>\d{3})_(?P<style>[A-Za-z]+)_\d+(?:_x_1_0)?")
+
+
+def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
+    """Read a folder, at any depth.
+
+    Raises
+    ------
+    BadData : no path, no file of the dataset, or a take that is there twice (raw and cleaned).
+    BadFile : files that cannot be read.
+    BadMotion : another skeleton.
+    """
+    if path is None:
+        raise BadData("it is read from your copy, and no path is given", where=NAME, remedy=HOW_TO_GET)
+    places = bvh_places(path)
+    files: dict[str, LabelledFile] = {}
+    for place in places:
+        found = _FILE.fullmatch(PurePosixPath(place).stem)
+        if found is None:
+            continue
+        if found["number"] in files:
+            raise BadData(
+                f"sequence {found['number']} is there twice: {files[found['number']].place} and {place}",
+                where=str(path),
+                cause="raw and cleaned files in one folder",
+                remedy="give the folder 'clean' or 'original'",
+            )
+        files[found["number"]] = LabelledFile(place, CONTENT, found["style"])
+    if not files:
+        raise BadData(
+            f"no file is called like 001_Neutral_0.bvh; the first is {places[0]}", where=str(path), remedy=HOW_TO_GET
+        )
+    labelled = list(files.values())
+    unit = guess_unit(rest_stature(read_motion(path / labelled[0].place, labelled[0].place), ZEROEGGS))
+    unit_m = UNITS_M[unit]
+
+    def to_clip(bvh: BvhMotion) -> Clip:
+        return to_canonical(bvh, ZEROEGGS, unit_m=unit_m)
+
+    facts = {"skeleton": ZEROEGGS.name, "unit_m": unit_m}
+    takes, digest = read_takes(path, labelled, to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
+    left = len(places) - len(files)
+    return Dataset(
+        name=NAME,
+        dataset_id=f"{NAME}-local",
+        digest=digest,
+        takes=takes,
+        judged_content={CONTENT: CONTENT},
+        licence=LICENCE,
+        citation=CITATION,
+        source=path.name,
+        notes=(
+            f"{len(files)} of {PUBLISHED_FILES} sequences",
+            f"unit {unit} assumed from the stature",
+            f"sequences are cut into takes of {PIECE_S:g} s",
+            *[f"{left} BVH files are mirrored or changed copies and left out"] * bool(left),
+        ),
+    )
+
+
+ENTRY = DatasetEntry(
+    load=load,
+    summary="captured gestures with speech: 19 styles of one actress, 60 fps; read from your copy",
+    licence=LICENCE,
+    citation=CITATION,
+    how_to_get=HOW_TO_GET,
+)
