@@ -21,6 +21,7 @@ from typing import Any
 from bench.adapters.base import Adapter
 from bench.adapters.loading import AdapterSource, find_adapter
 from bench.adapters.oracles import World
+from bench.adapters.session import OutOfTime
 from bench.datasets.pack import Pack
 from bench.datasets.take import Take
 from bench.errors import BadMotion, BadOutput, BenchError
@@ -83,9 +84,7 @@ def main(arguments: list[str]) -> int:
     os.dup2(2, 1)
 
     def send(message: dict[str, Any]) -> None:
-        # A method that forks and comes back must not report for its parent.
-        if os.getpid() != own:
-            os._exit(1)
+        leave_if_forked(own)
         line.write(json.dumps(message) + "\n")
 
     job = Job.read(Path(arguments[0]))
@@ -105,6 +104,12 @@ def main(arguments: list[str]) -> int:
         else:
             send({"event": "ok", "cell": cell.key})
     return 0
+
+
+def leave_if_forked(own: int) -> None:
+    """End a process that a method forked and that came back here: it must neither go on nor report for its parent."""
+    if os.getpid() != own:
+        os._exit(1)
 
 
 def leave_with_parent(parent: int) -> None:
@@ -150,10 +155,11 @@ def _generate(job: Job, cell: GenerateJob, adapter: Adapter, pack: Pack, send: S
     answer = answering(adapter, cell.track, cell.fps, pack, lambda: _world(job, pack))
 
     def write(folder: Path) -> dict[str, Any]:
-        started, last_report = time.perf_counter(), 0.0
+        started, last_report, own = time.perf_counter(), 0.0, os.getpid()
         answers: list[Take] = []
         for index, task in enumerate(tasks):
             answers.append(answer(task))
+            leave_if_forked(own)
             if time.perf_counter() - last_report > 0.5:
                 last_report = time.perf_counter()
                 send({"event": "progress", "cell": cell.key, "what": "generate", "done": index, "total": len(tasks)})
@@ -183,6 +189,8 @@ def _failure(key: str, error: Exception) -> dict[str, Any]:
     status = "invalid" if isinstance(error, BadOutput | BadMotion) else "failed"
     if isinstance(error, MemoryError):
         status = "oom"
+    if isinstance(error, OutOfTime):
+        status = "timeout"
     text = str(error) if isinstance(error, BenchError) else f"{type(error).__name__}: {error}"
     return {"event": "failed", "cell": key, "status": status, "reason": " ".join(text.split())}
 

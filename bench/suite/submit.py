@@ -24,7 +24,7 @@ from bench.suite.store import Store
 from bench.suite.submission import MANIFEST, Submission, read_submission
 from reports.records import MethodFacts, Record
 
-MANIFEST_LIMIT_BYTES = 2**24
+MANIFEST_LIMIT_BYTES = 2**23
 LABELS = ("style", "content", "source-style")
 
 
