@@ -1,7 +1,8 @@
 """What runs on any machine: one cell, or the timing of one setting, as one picklable call of plain data.
 
 A call names what it needs by stage and key in the store and carries no data. Another machine may see the store, and
-have this project, at paths of its own: see :meth:`Home.here`. What a call makes it leaves in the store.
+have this project, at paths of its own: see :meth:`bench.suite.machines.Home.here`. What a call makes it leaves in the
+store.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ import platform
 import time
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from bench.suite.cell import FIT_ONLY, Job
-from bench.suite.provenance import ROOT, provenance
+from bench.suite.machines import Wanted, problem_here
+from bench.suite.provenance import provenance
 from bench.suite.score import ScoreSpec, open_scorer, pin_threads
 from bench.suite.store import Store
 from bench.suite.timing.harness import TimingJob, TimingPlan, time_adapters
@@ -26,14 +28,11 @@ from bench.suite.timing.results import Timings
 from bench.suite.workers import Limits, Outcome, run_job
 from reports.records import Provenance, write_text_atomically
 
-STORE_VARIABLE = "STYLEBENCH_STORE"
-"""Environment variable of a worker machine: where it sees the store."""
 MOST_ATTEMPTS = 2
 VISIBLE_WITHIN_S = 60.0
 """Shared folders show what another machine wrote only after a while."""
 REPORT_EVERY_S = 0.5
 
-Plain = TypeVar("Plain")
 Answered = TypeVar("Answered", covariant=True)
 
 
@@ -47,38 +46,6 @@ class Call(Protocol[Answered]):
     def lost(self, reason: str) -> Answered:
         """The answer where no machine lived through it."""
         ...
-
-
-@dataclass(frozen=True)
-class Home:
-    """Where the machine that makes the calls has its store and this project, and the folder of its run in the store."""
-
-    store: str
-    run: str
-    project: str = str(ROOT)
-
-    @property
-    def store_here(self) -> Path:
-        """The store as this machine sees it."""
-        return Path(os.environ.get(STORE_VARIABLE) or self.store)
-
-    def here(self, value: Plain) -> Plain:
-        """The same plain data with the caller's paths replaced by this machine's."""
-        found = value
-        for theirs, ours in ((self.store, str(self.store_here)), (self.project, str(ROOT))):
-            if theirs != ours:
-                found = _moved(found, theirs, ours)
-        return found
-
-
-def _moved(value: Any, theirs: str, ours: str) -> Any:
-    if isinstance(value, str):
-        return ours + value[len(theirs) :] if value == theirs or value.startswith(theirs + "/") else value
-    if isinstance(value, tuple):
-        return tuple(_moved(item, theirs, ours) for item in value)
-    if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{f.name: _moved(getattr(value, f.name), theirs, ours) for f in fields(value)})
-    return value
 
 
 class Attempt:
@@ -137,6 +104,8 @@ class CellCall:
     Attributes
     ----------
     name : unique among the calls of a run.
+    folder : of the run, in the store.
+    wanted : what is asked of another machine; None where the call stays on this one.
     needs : what of the store it reads, as (stage, key).
     job : with one cell.
     spec : None where the method is only fitted.
@@ -145,7 +114,8 @@ class CellCall:
     """
 
     name: str
-    home: Home
+    folder: str
+    wanted: Wanted | None
     needs: tuple[tuple[str, str], ...]
     job: Job
     spec: ScoreSpec | None
@@ -160,15 +130,14 @@ class CellCall:
 
     def run(self) -> CellAnswer:
         """Do what the store lacks; whatever goes wrong is the cell's outcome."""
-        call: CellCall = self.home.here(self)
-        return call._run_here()
+        return (self.wanted.home.here(self) if self.wanted else self)._run_here()
 
     def lost(self, reason: str) -> CellAnswer:
         return self._answer(Outcome("failed", reason))
 
     def _run_here(self) -> CellAnswer:
         pin_threads(self.limits.threads)
-        attempt = Attempt(Path(self.home.run), self.name)
+        attempt = Attempt(Path(self.folder), self.name)
         if attempt.too_many:
             return self.lost(_lost_too_often(attempt.lost))
         try:
@@ -179,9 +148,9 @@ class CellCall:
 
     def _attempted(self, attempt: Attempt) -> CellAnswer:
         store = Store(Path(self.job.store))
-        lacking = store.missing(self.needs, VISIBLE_WITHIN_S)
-        if lacking:
-            return self.lost(lacks(lacking, store))
+        problem = problem_here(self.wanted) or lacks(store, self.needs, _patience_s(self.wanted))
+        if problem:
+            return self.lost(problem)
         stage = "fit" if self.job.cells[0].track == FIT_ONLY else "motions"
         generated = not store.has(stage, self.key)
         if generated:
@@ -215,7 +184,8 @@ class TimingCall:
     """The timing of all cells of a setting: they take turns on one machine, or the comparison would not be fair."""
 
     name: str
-    home: Home
+    folder: str
+    wanted: Wanted | None
     jobs: tuple[TimingJob, ...]
     plan: TimingPlan
     limits: Limits
@@ -224,23 +194,22 @@ class TimingCall:
 
     def run(self) -> TimingAnswer:
         """Time them, here and now; timings are never reused."""
-        call: TimingCall = self.home.here(self)
-        return call._run_here()
+        return (self.wanted.home.here(self) if self.wanted else self)._run_here()
 
     def lost(self, reason: str) -> TimingAnswer:
         made = made_here(self.command, self.limits.threads, {})
         return TimingAnswer({job.key: Outcome("failed", reason) for job in self.jobs}, made)
 
     def _run_here(self) -> TimingAnswer:
-        attempt = Attempt(Path(self.home.run), self.name)
+        attempt = Attempt(Path(self.folder), self.name)
         if attempt.too_many:
             return self.lost(_lost_too_often(attempt.lost))
         store = Store(Path(self.jobs[0].store))
         fits = [("fit", job.fit_key) for job in self.jobs if job.fit_key]
         packs = [("takes", Path(job.pack).name) for job in self.jobs]
-        lacking = store.missing([*dict.fromkeys(packs), *fits], VISIBLE_WITHIN_S)
-        if lacking:
-            return self.lost(lacks(lacking, store))
+        problem = problem_here(self.wanted) or lacks(store, [*dict.fromkeys(packs), *fits], _patience_s(self.wanted))
+        if problem:
+            return self.lost(problem)
         results = time_adapters(self.jobs, self.plan, Path(self.logs), limits=self.limits, progress=attempt.report)
         results = {key: _in_logs(found) if isinstance(found, Outcome) else found for key, found in results.items()}
         made = made_here(self.command, self.limits.threads, {})
@@ -262,10 +231,14 @@ def made_here(command: str, threads: int, facts: Mapping[str, Any]) -> Provenanc
     )
 
 
-def lacks(lacking: Sequence[tuple[str, str]], store: Store) -> str:
-    """What is wrong with a store that lacks something, in one line."""
-    wanted = ", ".join(f"{stage}/{key}" for stage, key in lacking)
-    return f"the store of {worker_name()} at {store.root} lacks {wanted}"
+def lacks(store: Store, wanted: Sequence[tuple[str, str]], wait_s: float) -> str:
+    """Which of some results, as (stage, key), the store does not have, in one line; empty where it has all."""
+    lacking = ", ".join(f"{stage}/{key}" for stage, key in store.missing(wanted, wait_s))
+    return f"the store of {worker_name()} at {store.root} lacks {lacking}" if lacking else ""
+
+
+def _patience_s(wanted: Wanted | None) -> float:
+    return VISIBLE_WITHIN_S if wanted else 0.0
 
 
 def _lost_too_often(lost: list[str]) -> str:

@@ -3,20 +3,58 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
-from functools import cache
+import os
+import platform
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any, TypeVar
 
 from bench.adapters.loading import AdapterSource, find_adapter
-from bench.errors import BenchError
-from bench.suite.calls import STORE_VARIABLE, Home
+from bench.errors import BadConfig, BenchError
 from bench.suite.keys import OWN_PACKAGES, adapter_digest
 from bench.suite.provenance import ROOT
 from bench.suite.store import Store
 
+STORE_VARIABLE = "STYLEBENCH_STORE"
+"""Environment variable of a worker machine: where it sees the store."""
 SEEN_WITHIN_S = 10.0
 DECISIVE = (".py", ".toml", ".csv", ".safetensors")
 """Endings of the files that decide numbers."""
+
+Plain = TypeVar("Plain")
+
+
+@dataclass(frozen=True)
+class Home:
+    """Where the machine that makes the calls has its store, its run's folder in it, and this project."""
+
+    store: str
+    run: str
+    project: str = str(ROOT)
+
+    @property
+    def store_here(self) -> Path:
+        """The store as this machine sees it."""
+        return Path(os.environ.get(STORE_VARIABLE) or self.store)
+
+    def here(self, value: Plain) -> Plain:
+        """The same plain data with the caller's paths replaced by this machine's."""
+        found = value
+        for theirs, ours in ((self.store, str(self.store_here)), (self.project, str(ROOT))):
+            if theirs != ours:
+                found = _moved(found, theirs, ours)
+        return found
+
+
+def _moved(value: Any, theirs: str, ours: str) -> Any:
+    if isinstance(value, str):
+        return ours + value[len(theirs) :] if value == theirs or value.startswith(theirs + "/") else value
+    if isinstance(value, tuple):
+        return tuple(_moved(item, theirs, ours) for item in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{f.name: _moved(getattr(value, f.name), theirs, ours) for f in fields(value)})
+    return value
 
 
 @dataclass(frozen=True)
@@ -69,6 +107,22 @@ def problems_here(wanted: Wanted) -> str:
         problem = _adapter_problem(wanted.home.here(source), digest)
         if problem:
             return problem
+    return ""
+
+
+def problem_here(wanted: Wanted | None) -> str:
+    """:func:`problems_here` for one more call of a run: looked at once by each process that can take part."""
+    try:
+        return _fit(wanted) if wanted else ""
+    except BadConfig as error:
+        return error.problem
+
+
+@lru_cache(maxsize=4)
+def _fit(wanted: Wanted) -> str:
+    problem = problems_here(wanted)
+    if problem:  # raised, for what is raised is not remembered
+        raise BadConfig(f"{platform.node()} {problem}")
     return ""
 
 

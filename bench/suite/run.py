@@ -67,10 +67,10 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
     datasets = _loaded(request, progress)
     records: list[Record] = []
     generated = scored = 0
-    with session_of(request, progress) as session:
-        planned = _settings(request, datasets, session.store)
+    with session_of(request, progress) as opened:
+        planned = _settings(request, datasets, opened.store)
         cells_of = [(setting, _cells(request, setting, sources)) for setting in planned.settings]
-        session.check_workers(cells_of)
+        session = opened.checked(cells_of)
         records_folder = fresh_records_folder(request.out)
         for setting, cells in cells_of:
             if setting.protocol.track == "runtime":

@@ -6,14 +6,14 @@ import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from bench.suite.calls import VISIBLE_WITHIN_S, Call, Home
+from bench.suite.calls import VISIBLE_WITHIN_S, Call
 from bench.suite.executors import Workers, workers_of
 from bench.suite.failures import Failures
-from bench.suite.machines import Wanted, code_digest
+from bench.suite.machines import Home, Wanted, code_digest
 from bench.suite.plan import Cell
 from bench.suite.request import RunRequest
 from bench.suite.setting import Setting
@@ -32,6 +32,7 @@ class Session:
     Attributes
     ----------
     folder : in the store; calls leave word there of their attempts and how far they are.
+    wanted : what is asked of every machine; None where no other takes part.
     """
 
     request: RunRequest
@@ -40,10 +41,7 @@ class Session:
     folder: Path
     failures: Failures
     progress: Progress
-
-    @property
-    def home(self) -> Home:
-        return Home(str(self.store.root), str(self.folder))
+    wanted: Wanted | None = None
 
     @property
     def logs(self) -> str:
@@ -54,19 +52,22 @@ class Session:
     def visible_within_s(self) -> float:
         return VISIBLE_WITHIN_S if self.request.scheduler else 0.0
 
-    def check_workers(self, planned: Sequence[tuple[Setting, Sequence[Cell]]]) -> None:
-        """Refuse workers that cannot do what was planned.
+    def checked(self, planned: Sequence[tuple[Setting, Sequence[Cell]]]) -> Session:
+        """This session, once all workers there are can do what was planned.
 
         Raises
         ------
         BadConfig : a machine lacks this code, the store, a dataset or an adapter.
         """
         if not self.request.scheduler:
-            return
+            return self
         datasets = {(setting.dataset.dataset_id, setting.pack_folder.name) for setting, _ in planned}
-        adapters = {(cell.source, cell.facts.digest) for _, cells in planned for cell in cells if cell.settled is None}
+        adapters = {(cell.source, cell.facts.digest) for _, cells in planned for cell in cells if not cell.settled}
         by_name = sorted(adapters, key=lambda item: item[0].name)
-        self.workers.check(Wanted(self.home, code_digest(), tuple(sorted(datasets)), tuple(by_name)))
+        home = Home(str(self.store.root), str(self.folder))
+        wanted = Wanted(home, code_digest(), tuple(sorted(datasets)), tuple(by_name))
+        self.workers.check(wanted)
+        return replace(self, wanted=wanted)
 
     def answers(self, calls: Sequence[Call[Answered]], name: str, before: int = 0) -> list[Answered]:
         """The answers to some calls, in their order; ``before`` cells of this name needed none."""

@@ -139,7 +139,8 @@ class SettingRun:
         job = GenerateJob(cell.motions_key, spec.tasks_file, protocol.track, protocol.fps)
         return CellCall(
             name=assemble.record_key(self.setting, cell),
-            home=self.session.home,
+            folder=str(self.session.folder),
+            wanted=self.session.wanted,
             needs=tuple(needs),
             job=job_of(self.setting, cell, self.store, job),
             spec=spec,
@@ -174,9 +175,9 @@ class SettingRun:
     def _visible(self, cell: Cell) -> Outcome:
         """Whether what a worker stored has arrived here."""
         wait_s = self.session.visible_within_s
-        lacking = self.store.missing([("motions", cell.motions_key)], wait_s)
-        if not lacking:
+        problem = lacks(self.store, [("motions", cell.motions_key)], wait_s)
+        if not problem:
             digest = str(self.store.facts("motions", cell.motions_key)["motions_digest"])
             keys = self.scorer.keys(digest, cell.given).values()
-            lacking = self.store.missing([("score", key) for key in keys], wait_s)
-        return Outcome("failed", lacks(lacking, self.store)) if lacking else Outcome("ok")
+            problem = lacks(self.store, [("score", key) for key in keys], wait_s)
+        return Outcome("failed", problem) if problem else Outcome("ok")

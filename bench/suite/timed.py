@@ -74,7 +74,8 @@ def _unfitted(session: Session, setting: Setting, cells: Sequence[Cell]) -> dict
     calls = [
         CellCall(
             name=f"fit-{assemble.record_key(setting, cell)}",
-            home=session.home,
+            folder=str(session.folder),
+            wanted=session.wanted,
             needs=(("takes", setting.pack_folder.name),),
             job=job_of(setting, cell, session.store, GenerateJob(cell.fit_key, "", FIT_ONLY, setting.protocol.fps)),
             spec=None,
@@ -93,7 +94,8 @@ def _unfitted(session: Session, setting: Setting, cells: Sequence[Cell]) -> dict
 def _timing_call(session: Session, jobs: Sequence[TimingJob]) -> TimingCall:
     return TimingCall(
         name=f"timing-{jobs[0].key}",
-        home=session.home,
+        folder=str(session.folder),
+        wanted=session.wanted,
         jobs=tuple(jobs),
         plan=PLANS[session.request.profile],
         limits=session.request.limits,

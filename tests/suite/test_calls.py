@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
-from bench.suite.calls import MOST_ATTEMPTS, STORE_VARIABLE, Attempt, CellCall, Home, worker_name
+from bench.suite.calls import MOST_ATTEMPTS, Attempt, CellCall, worker_name
 from bench.suite.failures import Failures
 from bench.suite.keys import adapter_digest
-from bench.suite.machines import Wanted, code_digest, problems_here
+from bench.suite.machines import STORE_VARIABLE, Home, Wanted, code_digest, problem_here, problems_here
 from bench.suite.store import Store
 from bench.suite.workers import Limits, Outcome
 from tests.suite.test_workers import make_job
@@ -79,9 +79,9 @@ def cell_call(folder: Path) -> CellCall:
     """A cell of six tasks that is only generated."""
     store = Store(folder / "store")
     home = Home(str(store.root), str(store.draft("run")))
-    return CellCall(
-        "cell", home, (), make_job(folder, "return clip"), None, True, Limits(wall_s=60), str(folder / "logs"), ""
-    )
+    wanted = Wanted(home, code_digest(), (), ())
+    job, limits = make_job(folder, "return clip"), Limits(wall_s=60)
+    return CellCall("cell", home.run, wanted, (), job, None, True, limits, str(folder / "logs"), "")
 
 
 def test_a_call_is_plain_data_and_does_its_work_once(tmp_path: Path) -> None:
@@ -103,11 +103,20 @@ def test_a_call_whose_store_lacks_something_fails_with_its_name(
     assert answer.outcome.status == "failed" and "lacks reference/abc" in answer.outcome.reason
 
 
+def test_a_machine_that_joins_late_and_is_unfit_says_so(tmp_path: Path) -> None:
+    call = cell_call(tmp_path)
+    assert call.wanted is not None
+    answer = replace(call, wanted=replace(call.wanted, code="other")).run()
+    assert answer.outcome.status == "failed" and "another version of this project" in answer.outcome.reason
+    assert problem_here(call.wanted) == problem_here(None) == ""
+
+
 def test_paths_move_with_the_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     call = cell_call(tmp_path)
     monkeypatch.setenv(STORE_VARIABLE, "/mnt/store")
-    moved = call.home.here(call)
-    assert moved.job.store == "/mnt/store" and moved.home.run.startswith("/mnt/store/tmp/run-")
+    assert call.wanted is not None
+    moved = call.wanted.home.here(call)
+    assert moved.job.store == "/mnt/store" and moved.folder.startswith("/mnt/store/tmp/run-")
     assert moved.logs == call.logs and moved.job.source == call.job.source
     assert moved.job.cells == call.job.cells
 

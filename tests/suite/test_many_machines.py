@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from bench.errors import BadConfig
-from bench.suite.calls import STORE_VARIABLE
+from bench.suite.machines import STORE_VARIABLE
 from tests.suite.tiny import contents, tiny_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default::ResourceWarning")]
