@@ -59,6 +59,11 @@ def bvh_places(folder: Path) -> list[str]:
     return places
 
 
+def neutral_as_elsewhere(style: str) -> str:
+    """A style's published name; ``Neutral`` as ``neutral``, by which protocols know the style without style."""
+    return "neutral" if style.lower() == "neutral" else style
+
+
 def read_motion(path: Path, name: str = "") -> BvhMotion:
     """A BVH file with joint names without prefixes."""
     return with_bare_names(read_bvh(path, name=name))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
-from bench.datasets.bvh_files import LabelledFile, bvh_places, read_takes
+from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_takes
 from bench.errors import BadData
 from bench.motion.bvh import BvhMotion
 from bench.motion.clip import Clip
@@ -37,12 +37,12 @@ PUBLISHED_FILES, PUBLISHED_STYLES, PUBLISHED_FRAMES = 810, 100, 4_055_978
 """Mason et al. 2022, Table 1; the frames are the sum of STOP - START over Frame_Cuts.csv."""
 PUBLISHED_TRANSITION_FRAMES = 786_818
 UNIT_M, PIECE_S = 0.01, 8.0
-LICENCE = "CC BY 4.0, to be confirmed on the page of the dataset"
+LICENCE = "CC BY 4.0"
 CITATION = (
     "Mason, Starke, Komura 2022, Real-Time Style Modelling of Human Locomotion via Feature-Wise Transformations and "
     "Local Motion Phases, PACMCGIT 5(1)"
 )
-HOW_TO_GET = "download 100STYLE from https://www.ianxmason.com/100style/, unpack it and give the folder"
+HOW_TO_GET = "download 100STYLE from https://www.ianxmason.com/100style/ (archived as zenodo.org/record/8127870), unpack it and give the folder"
 _FILE = re.compile(rf"(?P<style>[A-Za-z0-9]+)_(?P<gait>{'|'.join(GAITS)})")
 
 Cuts = Mapping[tuple[str, str], tuple[int, int]]
@@ -107,7 +107,8 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
         found = _FILE.fullmatch(PurePosixPath(place).stem)
         if found and (found["style"], found["gait"]) in cuts:
             frames = cuts[found["style"], found["gait"]]
-            files.append(LabelledFile(place, GAITS[found["gait"]], found["style"], frames=frames))
+            style = neutral_as_elsewhere(found["style"])
+            files.append(LabelledFile(place, GAITS[found["gait"]], style, frames=frames))
     if not files:
         raise BadData(f"no file is called like Angry_FW.bvh; the first is {places[0]}", where=str(path))
     full = len(files) >= PUBLISHED_FILES

@@ -11,7 +11,7 @@ import re
 from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
-from bench.datasets.bvh_files import LabelledFile, bvh_places, read_motion, read_takes
+from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_motion, read_takes
 from bench.errors import BadData
 from bench.motion.bvh import BvhMotion
 from bench.motion.clip import Clip
@@ -55,7 +55,7 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
                 cause="raw and cleaned files in one folder",
                 remedy="give the folder 'clean' or 'original'",
             )
-        files[found["number"]] = LabelledFile(place, CONTENT, found["style"])
+        files[found["number"]] = LabelledFile(place, CONTENT, neutral_as_elsewhere(found["style"]))
     if not files:
         raise BadData(
             f"no file is called like 001_Neutral_0.bvh; the first is {places[0]}", where=str(path), remedy=HOW_TO_GET

@@ -141,7 +141,7 @@ def test_zeroeggs(tmp_path: Path) -> None:
     write(folder / "001_Neutral_0_mirror.bvh", "zeroeggs")
     dataset = zeroeggs.load(folder)
     assert [(take.take_id, take.style, take.clip.n_frames) for take in dataset.takes] == [
-        ("001_Neutral_0_x_1_0-001", "Neutral", 500),
+        ("001_Neutral_0_x_1_0-001", "neutral", 500),
         ("006_Sad_0-001", "Sad", 6),
     ]
     assert dataset.content_labels == ("speech",)
