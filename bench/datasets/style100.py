@@ -42,7 +42,10 @@ CITATION = (
     "Mason, Starke, Komura 2022, Real-Time Style Modelling of Human Locomotion via Feature-Wise Transformations and "
     "Local Motion Phases, PACMCGIT 5(1)"
 )
-HOW_TO_GET = "download 100STYLE from https://www.ianxmason.com/100style/ (archived as zenodo.org/record/8127870), unpack it and give the folder"
+HOW_TO_GET = (
+    "download 100STYLE from https://www.ianxmason.com/100style/ (archived as zenodo.org/record/8127870), unpack it and "
+    "give the folder"
+)
 _FILE = re.compile(rf"(?P<style>[A-Za-z0-9]+)_(?P<gait>{'|'.join(GAITS)})")
 
 Cuts = Mapping[tuple[str, str], tuple[int, int]]
