@@ -2,7 +2,7 @@
 
 Files are called ``001_Neutral_0.bvh``, in the cleaned set ``001_Neutral_0_x_1_0.bvh``; mirrored copies and copies at
 another speed do not count. A take is a piece of ``PIECE_S`` seconds. All content is speech, so there is one content and
-nothing for a content judge to tell apart: this is data for the gesture track.
+nothing for a content judge to tell apart: tracks that need two contents refuse it and say so.
 """
 
 from __future__ import annotations
