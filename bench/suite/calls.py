@@ -130,6 +130,9 @@ class CellCall:
 
     def run(self) -> CellAnswer:
         """Do what the store lacks; whatever goes wrong is the cell's outcome."""
+        problem = problem_here(self.wanted)
+        if problem:
+            return self.lost(problem)
         return (self.wanted.home.here(self) if self.wanted else self)._run_here()
 
     def lost(self, reason: str) -> CellAnswer:
@@ -148,7 +151,7 @@ class CellCall:
 
     def _attempted(self, attempt: Attempt) -> CellAnswer:
         store = Store(Path(self.job.store))
-        problem = problem_here(self.wanted) or lacks(store, self.needs, _patience_s(self.wanted))
+        problem = lacks(store, self.needs, _patience_s(self.wanted))
         if problem:
             return self.lost(problem)
         stage = "fit" if self.job.cells[0].track == FIT_ONLY else "motions"
@@ -194,6 +197,9 @@ class TimingCall:
 
     def run(self) -> TimingAnswer:
         """Time them, here and now; timings are never reused."""
+        problem = problem_here(self.wanted)
+        if problem:
+            return self.lost(problem)
         return (self.wanted.home.here(self) if self.wanted else self)._run_here()
 
     def lost(self, reason: str) -> TimingAnswer:
@@ -207,7 +213,7 @@ class TimingCall:
         store = Store(Path(self.jobs[0].store))
         fits = [("fit", job.fit_key) for job in self.jobs if job.fit_key]
         packs = [("takes", Path(job.pack).name) for job in self.jobs]
-        problem = problem_here(self.wanted) or lacks(store, [*dict.fromkeys(packs), *fits], _patience_s(self.wanted))
+        problem = lacks(store, [*dict.fromkeys(packs), *fits], _patience_s(self.wanted))
         if problem:
             return self.lost(problem)
         results = time_adapters(self.jobs, self.plan, Path(self.logs), limits=self.limits, progress=attempt.report)

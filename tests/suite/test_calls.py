@@ -103,12 +103,15 @@ def test_a_call_whose_store_lacks_something_fails_with_its_name(
     assert answer.outcome.status == "failed" and "lacks reference/abc" in answer.outcome.reason
 
 
-def test_a_machine_that_joins_late_and_is_unfit_says_so(tmp_path: Path) -> None:
+def test_a_machine_that_joins_late_and_is_unfit_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     call = cell_call(tmp_path)
     assert call.wanted is not None
     answer = replace(call, wanted=replace(call.wanted, code="other")).run()
     assert answer.outcome.status == "failed" and "another version of this project" in answer.outcome.reason
     assert problem_here(call.wanted) == problem_here(None) == ""
+    late = replace(call, wanted=replace(call.wanted, datasets=(("other@1", "abc"),)))
+    monkeypatch.setenv(STORE_VARIABLE, str(tmp_path / "nowhere"))
+    assert "has no store at" in late.run().outcome.reason
 
 
 def test_paths_move_with_the_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -106,7 +106,7 @@ def test_killed_runs_resume_and_end_the_same(undisturbed: Path, tmp_path: Path) 
     chance = random.Random(0)
     finished: dict[Path, int] = {}
     main = subprocess.Popen(command)
-    kills = 0
+    kills = workers_killed = 0
     while kills < N_KILLS:
         try:
             assert main.wait(timeout=chance.uniform(0.5, 10.0)) == 0
@@ -114,6 +114,7 @@ def test_killed_runs_resume_and_end_the_same(undisturbed: Path, tmp_path: Path) 
         except subprocess.TimeoutExpired:
             kills += 1
             lives = _lives_on(main, chance)
+            workers_killed += lives
         if not lives:
             main = subprocess.Popen(command)
         now = {path.parent: path.stat().st_mtime_ns for path in store.glob("*/*/done.json")}
@@ -122,6 +123,7 @@ def test_killed_runs_resume_and_end_the_same(undisturbed: Path, tmp_path: Path) 
     assert main.wait() == 0
     assert subprocess.run(command, check=False).returncode == 0
 
+    assert 0 < workers_killed < N_KILLS
     assert contents(out) == contents(undisturbed / "out")
     assert results(store) == results(undisturbed / "store")
     assert list((store / "tmp").iterdir()) == []
