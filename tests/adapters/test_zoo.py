@@ -78,7 +78,7 @@ ZOO: dict[str, tuple[str, str, str]] = {
 
 HARMLESS = {
     "Floods": "sys.stdout.write('x' * 10**6)\nsys.stderr.write('y' * 10**6)",
-    "Forks": "subprocess.Popen(['sleep', '600'], start_new_session=True)",
+    "Forks": "subprocess.Popen(['sleep', '1234.5'], start_new_session=True)",
     "ForksAndComesBack": "if os.fork() == 0: time.sleep(0.01)",
     "IgnoresSigterm": "signal.signal(signal.SIGTERM, signal.SIG_IGN)",
     "DeletesItsScratch": "shutil.rmtree(tempfile.gettempdir(), ignore_errors=True)",
@@ -109,24 +109,24 @@ def descendants() -> set[int]:
     return {process.pid for process in psutil.Process().children(recursive=True) if process.is_running()}
 
 
-def temporary_files() -> set[str]:
-    return {path.name for path in Path(tempfile.gettempdir()).glob("stylebench-*")}
-
-
 @pytest.fixture(scope="module")
 def visit(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Record], Path]:
     """The records of one run with all animals, by method."""
     folder = tmp_path_factory.mktemp("zoo")
     (folder / "animals").mkdir()
     options = tuple(write_zoo(folder / "animals"))
-    before, files = descendants(), temporary_files()
-    result = tiny_run(folder / "out", folder / "store", adapter_files=options, limits=LIMITS, jobs=2)
+    before, scratch = descendants(), folder / "tmp"
+    scratch.mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(scratch))
+        patch.setattr(tempfile, "tempdir", None)
+        result = tiny_run(folder / "out", folder / "store", adapter_files=options, limits=LIMITS, jobs=2)
     deadline = time.monotonic() + 10.0
-    while (descendants() - before or temporary_files() - files) and time.monotonic() < deadline:
+    while (descendants() - before or list(scratch.glob("stylebench-*"))) and time.monotonic() < deadline:
         time.sleep(0.2)
     assert not [p for p in descendants() - before if "resource_tracker" not in " ".join(psutil.Process(p).cmdline())]
-    assert not temporary_files() - files
-    assert not [p for p in psutil.process_iter(["cmdline"]) if p.info["cmdline"] == ["sleep", "600"]]
+    assert not list(scratch.glob("stylebench-*"))
+    assert not [p for p in psutil.process_iter(["cmdline"]) if p.info["cmdline"] == ["sleep", "1234.5"]]
     return {record.method.name: record for record in result.records}, folder
 
 

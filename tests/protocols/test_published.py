@@ -13,7 +13,7 @@ from bench.adapters import ADAPTERS
 from bench.errors import BadConfig, BadFile
 from bench.metrics import METRICS
 from bench.protocols.published import FIELDS, PUBLISHED_CSV, Published, published_numbers, read_published_numbers
-from bench.suite.timing_plan import ONLINE, TimingPlan, offline
+from bench.suite.timing.plan import ONLINE, TimingPlan, offline
 
 NUMBERS_PER_TABLE = {
     "park2021.table1": 6,
