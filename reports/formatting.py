@@ -38,7 +38,7 @@ _LATEX = {
 
 
 def decimals_for(value: float, unit: str) -> int:
-    """Decimals of one number: 1 for percent, none for counts; else as many as show 3 digits, 2 for ratios, 4 at most."""
+    """Decimals of one number: 1 for percent, 0 for counts; else as many as show 3 digits, 2 for ratios, 4 at most."""
     if unit == "%":
         return 1
     if unit in ("count", "B"):

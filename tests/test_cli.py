@@ -13,7 +13,8 @@ from bench.cli import app
 
 runner = CliRunner()
 COMMANDS = (
-    ["run"], ["new-adapter"], ["check"], ["export-tasks"], ["score"], ["list"], ["data", "info"], ["report"],
+    ["run"], ["new-adapter"], ["check"], ["export-tasks"], ["score"], ["list"], ["data", "info"],
+    ["data", "verify"], ["data", "fetch"], ["data", "skeleton"], ["report"],
     ["leaderboard"], ["clean"],
 )  # fmt: skip
 
