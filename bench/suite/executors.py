@@ -7,14 +7,22 @@ import os
 import queue
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bench.errors import BadConfig
+from bench.errors import BadConfig, BenchError
 from bench.suite.calls import MOST_ATTEMPTS, Call, run_call
 from bench.suite.cell import leave_with_parent
 from bench.suite.machines import Wanted, problems_here
@@ -22,7 +30,6 @@ from bench.suite.machines import Wanted, problems_here
 POLL_S = 0.5
 CONNECT_S = 20
 WORKERS_WITHIN_S = 60
-ANSWER_WITHIN_S = 120
 
 Answered = TypeVar("Answered")
 
@@ -48,6 +55,10 @@ class Workers:
         """The answers to some calls, in their order.
 
         ``done`` hears how many have ended, ``waiting`` is called every half second.
+
+        Raises
+        ------
+        BenchError : the scheduler went away.
         """
         futures: dict[Future[Answered], int] = {self._submit(call): place for place, call in enumerate(calls)}
         losses = [0] * len(calls)
@@ -57,6 +68,12 @@ class Workers:
                 place = futures.pop(future)
                 try:
                     answers[place] = future.result()
+                except CancelledError:
+                    raise BenchError(
+                        "the scheduler was lost",
+                        where="--scheduler",
+                        remedy="start it and its workers again, then the same command: finished work is kept",
+                    ) from None
                 except self.losses as loss:
                     losses[place] += 1
                     if losses[place] < MOST_ATTEMPTS:

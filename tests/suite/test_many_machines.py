@@ -35,6 +35,10 @@ class Cluster:
     stack: ExitStack
     n_workers: int = 0
 
+    def __post_init__(self) -> None:
+        self.process = self.start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        wait_for(Path(self.scheduler).is_file)
+
     @property
     def scheduler(self) -> str:
         return str(self.folder / "scheduler.json")
@@ -75,10 +79,7 @@ class Cluster:
 def cluster(tmp_path: Path) -> Iterator[Cluster]:
     """A scheduler without workers."""
     with ExitStack() as stack:
-        found = Cluster(tmp_path, stack)
-        found.start("scheduler", "--host", "127.0.0.1", "--port", "0")
-        wait_for(lambda: Path(found.scheduler).is_file())
-        yield found
+        yield Cluster(tmp_path, stack)
 
 
 @pytest.fixture
@@ -102,6 +103,13 @@ def provenance_of(out: Path) -> list[dict[str, Any]]:
     return [json.loads(path.read_text())["provenance"] for path in sorted((out / "records").glob("*.json"))]
 
 
+def begun(out: Path, store: Path, cluster: Cluster) -> tuple[subprocess.Popen[str], Path]:
+    """A run on a cluster, in the middle of its first cell, and the file by which a worker claimed that."""
+    command = [sys.executable, "-m", "tests.suite.tiny", str(out), str(store), cluster.scheduler]
+    main = cluster.stack.enter_context(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
+    return main, wait_for(lambda: next((store / "tmp").glob("run-*/*.attempt-1"), None))
+
+
 def test_one_of_three_workers_is_killed_and_nothing_shows(
     undisturbed: Path, cluster: Cluster, store: Path, tmp_path: Path
 ) -> None:
@@ -109,9 +117,7 @@ def test_one_of_three_workers_is_killed_and_nothing_shows(
     workers = [cluster.add_worker(tmp_path / "mounted") for _ in range(N_WORKERS)]
     cluster.ready()
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "tests.suite.tiny", str(out), str(store), cluster.scheduler]
-    main = subprocess.Popen(command)
-    claim = wait_for(lambda: next((store / "tmp").glob("run-*/*.attempt-1"), None))
+    main, claim = begun(out, store, cluster)
     victim = int(wait_for(claim.read_text).rpartition(":")[2])
     assert victim in [worker.pid for worker in workers]
     os.kill(victim, signal.SIGKILL)
@@ -122,6 +128,19 @@ def test_one_of_three_workers_is_killed_and_nothing_shows(
     assert len(retried) == 1
     assert f":{victim} was lost; done again by" in retried[0]
     assert list((store / "tmp").iterdir()) in ([], [*(store / "tmp").glob(f"*-{victim}@*")])
+
+
+def test_a_run_that_loses_its_scheduler_says_so_and_goes_on_without(
+    undisturbed: Path, cluster: Cluster, store: Path, tmp_path: Path
+) -> None:
+    cluster.add_worker(store)
+    cluster.ready()
+    main, _ = begun(tmp_path / "out", store, cluster)
+    cluster.process.kill()
+    _, said = main.communicate(timeout=PATIENCE_S)
+    assert main.returncode != 0 and "the scheduler was lost; remedy: start it and its workers again" in said
+    tiny_run(tmp_path / "out", store)
+    assert contents(tmp_path / "out") == contents(undisturbed / "out")
 
 
 def test_workers_that_cannot_take_part_are_named_before_anything_runs(
