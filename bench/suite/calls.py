@@ -7,6 +7,7 @@ store.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import os
@@ -74,12 +75,13 @@ class Attempt:
         return f"the worker {', '.join(self.lost)} was lost; done again by {worker_name()}" if self.lost else ""
 
     def report(self, what: str, done: int, total: int) -> None:
-        """Leave word of how far the call is."""
+        """Leave word of how far the call is; where that fails, the work still counts."""
         if time.monotonic() - self.last_report >= REPORT_EVERY_S:
             self.last_report = time.monotonic()
             draft = self.progress_file.with_suffix(f".{os.getpid()}")
-            draft.write_text(json.dumps([what, done, total]))
-            draft.replace(self.progress_file)
+            with contextlib.suppress(OSError):
+                draft.write_text(json.dumps([what, done, total]))
+                draft.replace(self.progress_file)
 
 
 def worker_name() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -89,11 +90,13 @@ class _Detail:
         self.shown_ns = 0
 
     def show(self) -> None:
-        latest = max(((path.stat().st_mtime_ns, path) for path in self.folder.glob("*.progress")), default=None)
-        if latest and latest[0] > self.shown_ns:
-            self.shown_ns = latest[0]
-            what, done, total = json.loads(latest[1].read_text())
-            self.progress("cells", f"{what} {done}/{total}", -1, -1)
+        """Show it unless it was shown; a shared folder may lose a file between two looks."""
+        with contextlib.suppress(OSError, ValueError):
+            latest = max(((path.stat().st_mtime_ns, path) for path in self.folder.glob("*.progress")), default=None)
+            if latest and latest[0] > self.shown_ns:
+                self.shown_ns = latest[0]
+                what, done, total = json.loads(latest[1].read_text())
+                self.progress("cells", f"{what} {done}/{total}", -1, -1)
 
 
 @contextmanager
