@@ -69,28 +69,47 @@ def run_job(job: Job, scratch: Path, *, limits: Limits, listener: Listener) -> d
 def _run_worker(job: Job, scratch: Path, log: Path, limits: Limits, listener: Listener) -> dict[str, Outcome]:
     job_file = scratch / f"{log.stem}.job.json"
     write_text_atomically(job_file, json.dumps(asdict(job)))
-    # Removed with all that is in it when the worker ends, however it ends.
-    own_folder = Path(tempfile.mkdtemp(prefix="stylebench-cell-"))
-    process, lifeline = start_guarded(
-        [sys.executable, "-m", "bench.suite.cell", str(job_file)],
-        own_folder,
-        working_folder=Path.cwd(),
-        environment=worker_environment(limits.threads) | {"TMPDIR": str(own_folder)},
-    )
-    messages, errors = descriptor(process.stdout), descriptor(process.stderr)
-    if process.stdin is not None:
-        process.stdin.close()
-    with log.open("wb") as log_file:
-        pump = threading.Thread(target=copy_log, args=(errors, log_file.fileno(), bytearray()), daemon=True)
-        pump.start()
-        try:
-            return _Watch(job, process, log.name, limits, listener).until_end(messages)
-        finally:
-            end_guarded(process, lifeline, pump)
+    worker = GuardedWorker("bench.suite.cell", job_file, log, worker_environment(limits.threads))
+    worker.hang_up()
+    try:
+        return _Watch(job, worker.process, log.name, limits, listener).until_end(worker.answers)
+    finally:
+        worker.end()
 
 
-def descriptor(pipe: IO[bytes] | None) -> int:
-    """The file descriptor of a pipe; -1 where there is none."""
+class GuardedWorker:
+    """A module of ours in a process under a guard: stdin and stdout are the line to it, its stderr goes to a log.
+
+    It has a temporary folder of its own, which is removed with all that is in it when it ends, however it ends.
+    """
+
+    def __init__(self, module: str, job_file: Path, log: Path, environment: dict[str, str]) -> None:
+        folder = Path(tempfile.mkdtemp(prefix="stylebench-cell-"))
+        self.process, self._lifeline = start_guarded(
+            [sys.executable, "-m", module, str(job_file)],
+            folder,
+            working_folder=Path.cwd(),
+            environment=environment | {"TMPDIR": str(folder)},
+        )
+        self.requests, self.answers = _descriptor(self.process.stdin), _descriptor(self.process.stdout)
+        self._log = log.open("wb")
+        arguments = (_descriptor(self.process.stderr), self._log.fileno(), bytearray())
+        self._pump = threading.Thread(target=copy_log, args=arguments, daemon=True)
+        self._pump.start()
+
+    def hang_up(self) -> None:
+        """Close the line to the worker: it hears nothing more."""
+        if self.process.stdin is not None:
+            with contextlib.suppress(OSError):
+                self.process.stdin.close()
+
+    def end(self) -> None:
+        """Kill what is left of it."""
+        end_guarded(self.process, self._lifeline, self._pump)
+        self._log.close()
+
+
+def _descriptor(pipe: IO[bytes] | None) -> int:
     return -1 if pipe is None else pipe.fileno()
 
 
@@ -196,10 +215,3 @@ def cause_of_death(code: int) -> str:
     if number in set(signal.Signals):
         return f"the worker was killed by {signal.Signals(number).name}"
     return f"the worker ended with exit code {code}"
-
-
-def kill_group(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process and all of its group."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()

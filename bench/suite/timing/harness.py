@@ -7,7 +7,6 @@ import json
 import os
 import select
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from bench.adapters.base import ProgressCallback
 from bench.arrays import FloatArray
 from bench.suite.timing.plan import ONLINE, TimingJob, TimingPlan, Turns, write_job
 from bench.suite.timing.results import TimingFacts, Timings
-from bench.suite.workers import POLL_S, Limits, Outcome, cause_of_death, kill_group, tree_rss_mb, worker_environment
+from bench.suite.workers import POLL_S, GuardedWorker, Limits, Outcome, cause_of_death, tree_rss_mb, worker_environment
 
 __all__ = ["TimingJob", "TimingPlan", "time_adapters"]
 
@@ -102,39 +101,16 @@ class _Member:
         self.turns: dict[str, Turns] = {}
         self.busy_s = 0.0
         self.peak_tree_mb = 0.0
-        self.process: subprocess.Popen[bytes] | None = None
-        self.write_end = self.read_end = -1
+        self.worker: GuardedWorker | None = None
         self.buffer = b""
 
     def start(self) -> None:
         """Start the process and wait until the adapter is loaded."""
         write_job(self.file, self.job, self.plan, self.limits.threads)
-        their_input, self.write_end = os.pipe()
-        self.read_end, their_output = os.pipe()
-        command = [
-            sys.executable,
-            "-m",
-            "bench.suite.timing.worker",
-            str(self.file),
-            str(their_input),
-            str(their_output),
-        ]
         begin = time.perf_counter()
-        try:
-            with self.log.open("wb") as log_file:
-                self.process = subprocess.Popen(
-                    command,
-                    stdin=subprocess.DEVNULL,
-                    stdout=log_file,
-                    stderr=subprocess.STDOUT,
-                    pass_fds=(their_input, their_output),
-                    start_new_session=True,
-                    # A fixed hash seed lays out the dictionaries of all processes alike.
-                    env=worker_environment(self.limits.threads) | {"PYTHONHASHSEED": "0"},
-                )
-        finally:
-            os.close(their_input)
-            os.close(their_output)
+        # A fixed hash seed lays out the dictionaries of all processes alike.
+        environment = worker_environment(self.limits.threads) | {"PYTHONHASHSEED": "0"}
+        self.worker = GuardedWorker("bench.suite.timing.worker", self.file, self.log, environment)
         with self.watched():
             memory_mb = self._heard()["memory_mb"]
             harness_load_s = time.perf_counter() - begin
@@ -158,21 +134,21 @@ class _Member:
         ------
         _Lost : it failed, died, hung or grew too big.
         """
-        with contextlib.suppress(BrokenPipeError):
-            os.write(self.write_end, json.dumps(request).encode() + b"\n")
+        if self.worker is not None:
+            with contextlib.suppress(OSError):
+                os.write(self.worker.requests, json.dumps(request).encode() + b"\n")
         return self._heard()
 
     def stop(self) -> None:
         """End the process and all it started; one that did not fail may first clear up after itself."""
-        for end in (self.write_end, self.read_end):
-            if end >= 0:
-                os.close(end)
-        self.write_end = self.read_end = -1
-        if self.process is not None:
-            if self.outcome is None:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    self.process.wait(LEAVE_S)
-            kill_group(self.process)
+        if self.worker is None:
+            return
+        worker, self.worker = self.worker, None
+        worker.hang_up()
+        if self.outcome is None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                worker.process.wait(LEAVE_S)
+        worker.end()
 
     def result(self, companions: int) -> Timings | Outcome:
         """What the member came to."""
@@ -230,29 +206,31 @@ class _Member:
         return message
 
     def _listen(self, begin: float) -> None:
-        ready, _, _ = select.select([self.read_end], [], [], POLL_S)
+        if self.worker is None:
+            raise _Lost(Outcome("failed", "the worker is gone", self.log.name))
+        ready, _, _ = select.select([self.worker.answers], [], [], POLL_S)
         if ready:
-            data = os.read(self.read_end, 65536)
+            data = os.read(self.worker.answers, 65536)
             if not data:
-                raise self._died()
+                raise self._died(self.worker)
             self.buffer += data
             return
-        if self.process is None or self.process.poll() is not None:
-            raise self._died()
+        if self.worker.process.poll() is not None:
+            raise self._died(self.worker)
         if self.busy_s + time.monotonic() - begin > self.limits.wall_s:
             raise _Lost(Outcome("timeout", f"no answer within {self.limits.wall_s:.0f} s", self.log.name))
         self._watch_memory()
 
     def _watch_memory(self) -> None:
-        used = tree_rss_mb(self.process.pid) if self.process else 0.0
+        used = tree_rss_mb(self.worker.process.pid) if self.worker else 0.0
         self.peak_tree_mb = max(self.peak_tree_mb, used)
         if used > self.limits.rss_mb:
             reason = f"used {used:.0f} MB, the limit is {self.limits.rss_mb:.0f} MB"
             raise _Lost(Outcome("oom", reason, self.log.name))
 
-    def _died(self) -> _Lost:
+    def _died(self, worker: GuardedWorker) -> _Lost:
         try:
-            code = self.process.wait(POLL_S * 20) if self.process else 1
+            code = worker.process.wait(POLL_S * 20)
         except subprocess.TimeoutExpired:
             return _Lost(Outcome("failed", "the worker closed its pipe", self.log.name))
         return _Lost(Outcome("failed", cause_of_death(code), self.log.name))

@@ -1,7 +1,7 @@
-"""The process in which one adapter is timed, started as ``python -m bench.suite.timing.worker JOB.json FD_IN FD_OUT``.
+"""The process in which one adapter is timed, started as ``python -m bench.suite.timing.worker JOB.json``.
 
-It loads the adapter, says so, and then answers one request at a time: while it waits, others compute. What the method
-prints goes to the log that the parent made stdout and stderr; messages travel as JSON lines on their own pipes.
+It loads the adapter, says so, and then answers one request at a time: while it waits, others compute. Requests and
+answers travel as JSON lines on what were stdin and stdout at the start; what the method prints goes to stderr, the log.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ def main(arguments: list[str]) -> int:
     """Answer requests until the parent closes the pipe; a failure is the last answer."""
     job, plan, threads = read_job(Path(arguments[0]))
     threading.Thread(target=_leave_with_parent, args=(os.getppid(),), daemon=True).start()
-    for number in (int(arguments[1]), int(arguments[2])):
-        os.set_inheritable(number, False)
-    requests = os.fdopen(int(arguments[1]), "r")
-    answers = os.fdopen(int(arguments[2]), "w", buffering=1)
+    # What the method prints goes to the log, and what it reads is empty: the line is not its own.
+    requests, answers = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
 
     def send(message: dict[str, Any]) -> None:
         answers.write(json.dumps(message) + "\n")
