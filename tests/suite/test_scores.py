@@ -8,7 +8,7 @@ import pytest
 from bench.protocols.transfer import TRANSFER
 from bench.suite.embedding import Embedding
 from bench.suite.scores import SCORES
-from bench.suite.scores.base import Reference, Scored
+from bench.suite.scores.base import Labelled, Reference, Scored
 from reports.records import Measurement
 from tests.suite.factory import N_TASKS, reference, row
 
@@ -88,6 +88,13 @@ def test_distances_carry_floor_and_sizes(ref: Reference) -> None:
     assert {"n_real": 120.0, "d": 8.0}.items() <= measurement.details.items()
     assert measurement.details["judge_spread"] == pytest.approx(np.std(measurement.judge_values, ddof=1))
     assert len(measurement.judge_values) == 2
+
+
+def test_conditional_distance_of_too_few_real_windows_is_a_reason(ref: Reference) -> None:
+    few = Labelled(ref.real.embedding.take(np.arange(12)), ref.real.contents[:12], ref.real.styles[:12])
+    measurement = found(SCORES["conditional_kid"](row(ref), replace(ref, real=few)), "all")
+    assert measurement.value is None
+    assert measurement.reason == "no label has 20 real and 2 generated samples"
 
 
 def test_frechet_of_too_few_samples_is_a_reason(ref: Reference) -> None:

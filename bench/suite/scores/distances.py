@@ -55,6 +55,10 @@ def _conditional(name: str, row: Row, reference: Reference, form: _Kid | _Fmd) -
         mask = reference.slices[slice_name]
         counts = reference.counts[:, mask]
         sides = {kind: _sides(kind, generated, reference, form, mask, counts) for kind in SIDES}
+        unscorable = sides["style"][2] or sides["content"][2]
+        if unscorable:
+            measurements.append(measure(name, slice_name, float("nan"), int(mask.sum()), reason=unscorable))
+            continue
         values = np.maximum(sides["style"][0], sides["content"][0])
         draws = np.maximum(sides["style"][1], sides["content"][1]).mean(axis=0)
         replicates[f"{name}|{slice_name}"] = draws
@@ -72,10 +76,10 @@ def _conditional(name: str, row: Row, reference: Reference, form: _Kid | _Fmd) -
 def _sides(
     kind: str, generated: Labelled, reference: Reference, form: _Kid | _Fmd, mask: BoolArray | None,
     counts: NDArray[np.int32] | None,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Values ``[S]`` and replicates ``[S, B]`` conditioned on style or content."""
+) -> tuple[FloatArray, FloatArray, str]:  # fmt: skip
+    """Values ``[S]`` and replicates ``[S, B]`` conditioned on style or content, and why they are undefined if so."""
     rows = slice(None) if mask is None else mask
-    real, values, draws = reference.real, [], []
+    real, values, draws, reason = reference.real, [], [], ""
     labels = (real.styles, generated.styles) if kind == "style" else (real.contents, generated.contents)
     for seed in range(real.embedding.n_seeds):
         of_real, of_generated = (
@@ -83,9 +87,10 @@ def _sides(
         )
         result = form.distance(of_real, labels[0], of_generated[rows], labels[1][rows])
         values.append(result.value)
+        reason = result.reason
         if counts is not None:
             draws.append(form.replicates(of_real, labels[0], of_generated[rows], labels[1][rows], counts))
-    return np.array(values), np.array(draws)
+    return np.array(values), np.array(draws), reason
 
 
 def _left_out(reference: Reference) -> str:
