@@ -197,10 +197,13 @@ class Channel:
         self.lock = threading.Lock()
         self.owner = os.getpid()
 
-    def send(self, message: dict[str, Any]) -> None:
+    def leave_if_forked(self) -> None:
+        """End a fork of the user's code that came back as if it were the worker: it must not answer, nor write."""
         if os.getpid() != self.owner:
-            # A fork of the user's code came back as if it were the worker.
             os._exit(1)
+
+    def send(self, message: dict[str, Any]) -> None:
+        self.leave_if_forked()
         data = (json.dumps(message, allow_nan=False) + "\n").encode("utf-8")
         with self.lock:
             while data:
@@ -375,7 +378,9 @@ class Worker:
         _seed_generators(optional["seed"])
         if name not in self.known:
             self.known[name] = list(inspect.signature(function).parameters)
-        return function(*arguments, **{key: value for key, value in optional.items() if key in self.known[name]})
+        answer = function(*arguments, **{key: value for key, value in optional.items() if key in self.known[name]})
+        self.channel.leave_if_forked()
+        return answer
 
     def _motion(self, entry: dict[str, Any]) -> Motion:
         path = str(self.exchange / entry["file"])

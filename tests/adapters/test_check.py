@@ -257,7 +257,7 @@ def test_outside_program_that_does_not_stop_fails_its_row(tmp_path: Path) -> Non
     import signal, time
     def transfer(content, style):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        time.sleep(0.05)
+        time.sleep(0.5)
         return content
     """
     adapter = with_worker(tmp_path, code, "[timeouts]\nstop_s = 0.1")
