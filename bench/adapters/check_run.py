@@ -11,8 +11,6 @@ import os
 import select
 import subprocess
 import sys
-import tempfile
-import threading
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -20,8 +18,9 @@ from pathlib import Path
 
 from bench.adapters.answers import CheckRow
 from bench.adapters.check import check_adapter
+from bench.adapters.guarded import GuardedModule
 from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
-from bench.adapters.session import copy_log, end_guarded, one_line, start_guarded
+from bench.adapters.session import one_line
 from bench.errors import BenchError
 
 ROW_LIMIT_S = 300.0
@@ -36,25 +35,14 @@ def check_option(option: str, *, log: Path, row_limit_s: float = ROW_LIMIT_S) ->
     log : file that gets what the adapter prints.
     row_limit_s : how long one check may take.
     """
-    scratch = Path(tempfile.mkdtemp(prefix="stylebench-check-"))
     root = Path(__file__).resolve().parents[2]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONPATH": _path_with(root), "TMPDIR": str(scratch)}
-    command = [sys.executable, "-m", "bench.adapters.check_run", option]
-    process, lifeline = start_guarded(command, scratch, working_folder=Path.cwd(), environment=environment)
-    with log.open("wb") as log_file:
-        errors = process.stderr.fileno() if process.stderr else -1
-        tail = bytearray()
-        pump = threading.Thread(target=copy_log, args=(errors, log_file.fileno(), tail), daemon=True)
-        pump.start()
-        try:
-            yield from _rows(process, row_limit_s, log)
-        finally:
-            end_guarded(process, lifeline, pump)
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONPATH": _path_with(root)}
+    with GuardedModule("bench.adapters.check_run", option, environment=environment, log=log) as checking:
+        yield from _rows(checking, row_limit_s, log)
 
 
-def _rows(process: subprocess.Popen[bytes], row_limit_s: float, log: Path) -> Iterator[CheckRow]:
+def _rows(checking: GuardedModule, row_limit_s: float, log: Path) -> Iterator[CheckRow]:
     buffer, expected = b"", "an answer to every check"
-    source = process.stdout.fileno() if process.stdout else -1
     deadline = time.monotonic() + row_limit_s
     while True:
         while b"\n" in buffer:
@@ -69,10 +57,10 @@ def _rows(process: subprocess.Popen[bytes], row_limit_s: float, log: Path) -> It
             remedy = f"run its calls by hand; what it printed is in {log}"
             yield CheckRow("answers in time", False, expected, f"nothing for {row_limit_s:g} s", "it hangs", remedy)
             return
-        if select.select([source], [], [], left)[0]:
-            data = os.read(source, 65536)
+        if select.select([checking.answers], [], [], left)[0]:
+            data = os.read(checking.answers, 65536)
             if not data:
-                yield CheckRow("stays alive", False, expected, _end_of(process), remedy=f"see its log, {log}")
+                yield CheckRow("stays alive", False, expected, _end_of(checking.process), remedy=f"see its log, {log}")
                 return
             buffer += data
 

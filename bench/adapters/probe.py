@@ -9,14 +9,11 @@ import json
 import os
 import select
 import sys
-import tempfile
-import threading
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
+from bench.adapters.guarded import GuardedModule
 from bench.adapters.loading import source_from_option
-from bench.adapters.session import copy_log, end_guarded, start_guarded
 from bench.errors import BadConfig, BenchError
 
 IMPORT_LIMIT_S = 120.0
@@ -38,26 +35,11 @@ def import_failure(option: str, *, limit_s: float = IMPORT_LIMIT_S) -> ImportFai
     ------
     BadConfig : the option itself is wrong: no such file, no adapter class in it, or several.
     """
-    folder = Path(tempfile.mkdtemp(prefix="stylebench-import-"))
-    process, lifeline = start_guarded(
-        [sys.executable, "-m", "bench.adapters.probe", option],
-        folder,
-        working_folder=Path.cwd(),
-        environment={**os.environ, "TMPDIR": str(folder)},
-    )
-    if process.stdin is not None:
-        process.stdin.close()
-    errors, printed = process.stderr.fileno() if process.stderr else -1, bytearray()
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    pump = threading.Thread(target=copy_log, args=(errors, nowhere, printed), daemon=True)
-    pump.start()
-    try:
-        said = _line(process.stdout.fileno() if process.stdout else -1, time.monotonic() + limit_s)
-    finally:
-        end_guarded(process, lifeline, pump)
-        os.close(nowhere)
+    with GuardedModule("bench.adapters.probe", option, environment=dict(os.environ)) as importing:
+        importing.hang_up()
+        said = _line(importing.answers, time.monotonic() + limit_s)
     reason = _reason(said, limit_s)
-    return ImportFailure(reason, printed.decode("utf-8", "replace")) if reason else None
+    return ImportFailure(reason, importing.printed.decode("utf-8", "replace")) if reason else None
 
 
 def _reason(said: bytes | None, limit_s: float) -> str:

@@ -14,25 +14,20 @@ import os
 import select
 import shutil
 import subprocess
-import sys
 import tempfile
-import threading
 import time
-import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bench.adapters import guard
 from bench.adapters.base import ProgressCallback
+from bench.adapters.guarded import Guarded
 from bench.adapters.program import Program
 from bench.errors import BenchError, MethodFailed
 
 PROTOCOLS = [1]
 HEARTBEAT_S = 2.0
 MAX_LINE_BYTES = 1 << 20
-LOG_BYTES = 4 << 20
-"""How much of a program's chatter is kept; the rest is read and dropped."""
 SHARED_MEMORY = Path("/dev/shm")
 SHARED_MEMORY_MIN_BYTES = 2 << 30
 
@@ -64,34 +59,28 @@ class Session:
         self._last_id = -1
         self._abandoned: set[int] = set()
         self._buffer = b""
-        self._log_tail = bytearray()
         try:
             command = program.command_line(self.exchange)
-            self._start(command, log_fd)
         except BaseException:
             shutil.rmtree(self.exchange, ignore_errors=True)
             raise
-
-    def _start(self, command: list[str], log_fd: int) -> None:
-        self.process, lifeline = start_guarded(
-            command, self.exchange, working_folder=self.program.working_folder, environment=_environment(self.program)
+        self._guarded = Guarded(
+            command,
+            self.exchange,
+            working_folder=program.working_folder,
+            environment=_environment(program),
+            log_fd=log_fd,
         )
-        if self.process.stdin is None or self.process.stdout is None or self.process.stderr is None:
-            raise MethodFailed("pipes to the program could not be made")
-        self._in, self._out, errors = self.process.stdin, self.process.stdout, self.process.stderr
-        os.set_blocking(self._in.fileno(), False)
-        pump = threading.Thread(target=copy_log, args=(errors.fileno(), log_fd, self._log_tail), daemon=True)
-        pump.start()
-        self._end = weakref.finalize(self, end_guarded, self.process, lifeline, pump)
+        os.set_blocking(self._guarded.requests, False)
 
     @property
     def is_open(self) -> bool:
-        return self._end.alive
+        return self._guarded.is_open
 
     @property
     def pid(self) -> int:
         """Process id of the guard; the program and its children descend from it."""
-        return self.process.pid
+        return self._guarded.process.pid
 
     def request(
         self, call: str, fields: dict[str, Any], timeout_s: float, progress: ProgressCallback | None = None
@@ -133,21 +122,21 @@ class Session:
         if not kill:
             with contextlib.suppress(BenchError, subprocess.TimeoutExpired):
                 self._send({"call": "stop"}, "stop")
-                self.process.wait(self.program.timeouts.stop_s)
-        self._end()
+                self._guarded.process.wait(self.program.timeouts.stop_s)
+        self._guarded.end()
 
     def _send(self, message: dict[str, Any], call: str) -> None:
         data = memoryview((json.dumps(message, allow_nan=False) + "\n").encode())
         deadline = time.monotonic() + self.program.timeouts.silence_s
         while data:
             try:
-                data = data[os.write(self._in.fileno(), data) :]
+                data = data[os.write(self._guarded.requests, data) :]
             except BlockingIOError:
                 left = deadline - time.monotonic()
                 if left <= 0.0:
                     problem = f"does not read its input: {call!r} could not be sent"
                     raise self._violation(problem, "it does not read lines from stdin") from None
-                select.select([], [self._in], [], left)
+                select.select([], [self._guarded.requests], [], left)
             except OSError:
                 raise self._death(call) from None
 
@@ -161,7 +150,7 @@ class Session:
                 return None
             if call == "hello" and not line.lstrip().startswith(b"{"):
                 # What activates an environment may print a banner before the program itself starts.
-                self._log_tail += line[:1000] + b"\n"
+                self._guarded.printed += line[:1000] + b"\n"
                 continue
             message = self._message(line, call)
             event = message.get("event")
@@ -195,9 +184,9 @@ class Session:
             if now >= silence:
                 problem = f"no sign of life for {self.program.timeouts.silence_s:g} s during {call!r}"
                 raise self._violation(problem, "it hangs in one long call that lets no other thread run")
-            if not select.select([self._out], [], [], min(deadline, silence) - now)[0]:
+            if not select.select([self._guarded.answers], [], [], min(deadline, silence) - now)[0]:
                 continue
-            data = os.read(self._out.fileno(), 65536)
+            data = os.read(self._guarded.answers, 65536)
             if not data:
                 raise self._death(call)
             last_sign = time.monotonic()
@@ -222,8 +211,8 @@ class Session:
 
     def _death(self, call: str) -> MethodFailed:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self.process.wait(3.0)
-        code = self.process.returncode
+            self._guarded.process.wait(3.0)
+        code = self._guarded.process.returncode
         if code is None:
             return self._violation(f"closed its output during {call!r}", "it closed stdout, which it must keep open")
         # The log's last line may still be on its way.
@@ -233,37 +222,8 @@ class Session:
         return MethodFailed(f"the program {how} during {call!r}", where=self.program.name, cause=cause)
 
     def _last_words(self) -> str:
-        lines = [line.strip() for line in bytes(self._log_tail).decode("utf-8", "replace").splitlines()]
+        lines = [line.strip() for line in bytes(self._guarded.printed).decode("utf-8", "replace").splitlines()]
         return one_line(next((line for line in reversed(lines) if line), ""))
-
-
-def start_guarded(
-    command: list[str], exchange: Path, *, working_folder: Path, environment: dict[str, str]
-) -> tuple[subprocess.Popen[bytes], int]:
-    """Start a command, its three standard streams as pipes, so that nothing of it outlives this process.
-
-    Once the second value, a file descriptor, is closed, the command and all that descends from it are killed and the
-    folder ``exchange`` is removed.
-    """
-    lifeline_read, lifeline = os.pipe()
-    try:
-        process = subprocess.Popen(
-            [sys.executable, "-I", guard.__file__, str(lifeline_read), str(exchange), *command],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            bufsize=0,
-            pass_fds=(lifeline_read,),
-            start_new_session=True,
-            cwd=working_folder,
-            env=environment,
-        )
-    except BaseException:
-        os.close(lifeline)
-        raise
-    finally:
-        os.close(lifeline_read)
-    return process, lifeline
 
 
 def parse_message(line: bytes) -> dict[str, Any]:
@@ -319,37 +279,3 @@ def _environment(program: Program) -> dict[str, str]:
     own = ("VIRTUAL_ENV", "__PYVENV_LAUNCHER__")
     kept = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON") and name not in own}
     return {**kept, "PYTHONUNBUFFERED": "1", **program.environment}
-
-
-def copy_log(source: int, target: int, tail: bytearray) -> None:
-    """Copy a program's stderr to the log up to a limit, and keep its last words."""
-    left = LOG_BYTES
-    while True:
-        try:
-            data = os.read(source, 65536)
-            if not data:
-                return
-            tail += data
-            del tail[:-4000]
-            if left > 0:
-                os.write(target, data[:left])
-                left -= len(data)
-                if left <= 0:
-                    os.write(target, b"\n[the rest of the log is dropped]\n")
-        except OSError:
-            return
-
-
-def end_guarded(process: subprocess.Popen[bytes], lifeline: int, pump: threading.Thread) -> None:
-    """Let go of the lifeline: the guard kills what is left and leaves."""
-    os.close(lifeline)
-    try:
-        process.wait(guard.GIVE_UP_S + 5.0)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    pump.join(1.0)
-    for pipe in (process.stdin, process.stdout, process.stderr):
-        if pipe is not None:
-            with contextlib.suppress(OSError):
-                pipe.close()

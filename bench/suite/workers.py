@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import select
 import signal
 import subprocess
-import sys
-import tempfile
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import psutil
 
-from bench.adapters.session import copy_log, end_guarded, start_guarded
+from bench.adapters.guarded import GuardedModule
 from bench.suite.cell import Job
 from reports.records import Status, write_text_atomically
 
@@ -69,48 +65,10 @@ def run_job(job: Job, scratch: Path, *, limits: Limits, listener: Listener) -> d
 def _run_worker(job: Job, scratch: Path, log: Path, limits: Limits, listener: Listener) -> dict[str, Outcome]:
     job_file = scratch / f"{log.stem}.job.json"
     write_text_atomically(job_file, json.dumps(asdict(job)))
-    worker = GuardedWorker("bench.suite.cell", job_file, log, worker_environment(limits.threads))
-    worker.hang_up()
-    try:
+    environment = worker_environment(limits.threads)
+    with GuardedModule("bench.suite.cell", str(job_file), environment=environment, log=log) as worker:
+        worker.hang_up()
         return _Watch(job, worker.process, log.name, limits, listener).until_end(worker.answers)
-    finally:
-        worker.end()
-
-
-class GuardedWorker:
-    """A module of ours in a process under a guard: stdin and stdout are the line to it, its stderr goes to a log.
-
-    It has a temporary folder of its own, which is removed with all that is in it when it ends, however it ends.
-    """
-
-    def __init__(self, module: str, job_file: Path, log: Path, environment: dict[str, str]) -> None:
-        folder = Path(tempfile.mkdtemp(prefix="stylebench-cell-"))
-        self.process, self._lifeline = start_guarded(
-            [sys.executable, "-m", module, str(job_file)],
-            folder,
-            working_folder=Path.cwd(),
-            environment=environment | {"TMPDIR": str(folder)},
-        )
-        self.requests, self.answers = _descriptor(self.process.stdin), _descriptor(self.process.stdout)
-        self._log = log.open("wb")
-        arguments = (_descriptor(self.process.stderr), self._log.fileno(), bytearray())
-        self._pump = threading.Thread(target=copy_log, args=arguments, daemon=True)
-        self._pump.start()
-
-    def hang_up(self) -> None:
-        """Close the line to the worker: it hears nothing more."""
-        if self.process.stdin is not None:
-            with contextlib.suppress(OSError):
-                self.process.stdin.close()
-
-    def end(self) -> None:
-        """Kill what is left of it."""
-        end_guarded(self.process, self._lifeline, self._pump)
-        self._log.close()
-
-
-def _descriptor(pipe: IO[bytes] | None) -> int:
-    return -1 if pipe is None else pipe.fileno()
 
 
 def worker_environment(threads: int) -> dict[str, str]:

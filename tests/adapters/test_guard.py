@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.adapters.session import end_guarded, start_guarded
+from bench.adapters.guarded import end_guarded, start_guarded
 from tests.adapters.outside import left_behind
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,7 +87,7 @@ def test_a_guard_within_a_guard_cleans_up_too(tmp_path: Path) -> None:
     code = f"""
     import sys, time
     from pathlib import Path
-    from bench.adapters.session import start_guarded
+    from bench.adapters.guarded import start_guarded
     command = [sys.executable, "-c", "import time; time.sleep(600)", sys.argv[1]]
     kept = start_guarded(command, Path({str(inner)!r}), working_folder=Path.cwd(), environment={{}})
     time.sleep(0.5)

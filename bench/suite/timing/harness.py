@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from bench.adapters.base import ProgressCallback
+from bench.adapters.guarded import GuardedModule
 from bench.arrays import FloatArray
 from bench.suite.timing.plan import ONLINE, TimingJob, TimingPlan, Turns, write_job
 from bench.suite.timing.results import TimingFacts, Timings
-from bench.suite.workers import POLL_S, GuardedWorker, Limits, Outcome, cause_of_death, tree_rss_mb, worker_environment
+from bench.suite.workers import POLL_S, Limits, Outcome, cause_of_death, tree_rss_mb, worker_environment
 
 __all__ = ["TimingJob", "TimingPlan", "time_adapters"]
 
@@ -101,7 +102,7 @@ class _Member:
         self.turns: dict[str, Turns] = {}
         self.busy_s = 0.0
         self.peak_tree_mb = 0.0
-        self.worker: GuardedWorker | None = None
+        self.worker: GuardedModule | None = None
         self.buffer = b""
 
     def start(self) -> None:
@@ -110,7 +111,7 @@ class _Member:
         begin = time.perf_counter()
         # A fixed hash seed lays out the dictionaries of all processes alike.
         environment = worker_environment(self.limits.threads) | {"PYTHONHASHSEED": "0"}
-        self.worker = GuardedWorker("bench.suite.timing.worker", self.file, self.log, environment)
+        self.worker = GuardedModule("bench.suite.timing.worker", str(self.file), environment=environment, log=self.log)
         with self.watched():
             memory_mb = self._heard()["memory_mb"]
             harness_load_s = time.perf_counter() - begin
@@ -228,7 +229,7 @@ class _Member:
             reason = f"used {used:.0f} MB, the limit is {self.limits.rss_mb:.0f} MB"
             raise _Lost(Outcome("oom", reason, self.log.name))
 
-    def _died(self, worker: GuardedWorker) -> _Lost:
+    def _died(self, worker: GuardedModule) -> _Lost:
         try:
             code = worker.process.wait(POLL_S * 20)
         except subprocess.TimeoutExpired:
