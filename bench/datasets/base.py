@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
+from bench.datasets.reading import Overrides
 from bench.datasets.take import Take
 
 ProgressCallback = Callable[[str, int, int], None]
@@ -56,6 +58,12 @@ class Dataset:
         return {take.take_id: take for take in self.takes}
 
 
+class LoadAs(Protocol):
+    """Loads a dataset with unit, up axis or frame rate as given."""
+
+    def __call__(self, path: Path | None, progress: ProgressCallback | None, overrides: Overrides) -> Dataset: ...
+
+
 @dataclass(frozen=True)
 class DatasetEntry:
     """A row of the DATASETS table.
@@ -67,6 +75,7 @@ class DatasetEntry:
     licence, citation : known before anything is loaded.
     how_to_get : where to obtain it, in one sentence.
     needs_path : False for generated data.
+    load_as : the same for files whose unit, up axis and frame rate may be given; None where they are fixed.
     """
 
     load: Callable[[Path | None, ProgressCallback | None], Dataset]
@@ -75,3 +84,4 @@ class DatasetEntry:
     citation: str
     how_to_get: str = ""
     needs_path: bool = True
+    load_as: LoadAs | None = None

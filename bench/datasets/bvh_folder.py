@@ -15,15 +15,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.bvh_files import LabelledFile, bvh_places, read_motion, read_takes
 from bench.datasets.labels import LABELS_CSV, labels_from_csv, labels_from_pattern
+from bench.datasets.reading import Overrides, Reading
 from bench.errors import BadConfig, BadData
 from bench.motion.bvh import BvhMotion
-from bench.motion.clip import Clip
 from bench.motion.recognise import (
     common_stature,
     guess_unit,
@@ -33,8 +32,7 @@ from bench.motion.recognise import (
     recognise,
     unit_metres,
 )
-from bench.motion.retarget import rest_stature, to_canonical
-from bench.motion.skeleton_maps import SkeletonMap
+from bench.motion.retarget import rest_stature
 from bench.motion.user_map import read_skeleton_map, read_toml
 
 NAME = "bvh-folder"
@@ -45,31 +43,8 @@ LOOKED_AT = 20
 HOW_TO_GET = f"your own folder of BVH files with {LABELS_CSV} (columns file, content, style), see docs/datasets.md"
 
 
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """How the files of a folder are read.
-
-    Attributes
-    ----------
-    skeleton_map : joints.
-    unit_m : metres per file unit.
-    up : ``"y"`` or ``"z"``.
-    fps : None where the files' frame times hold.
-    notes : what was assumed and what was given, one sentence each.
-    """
-
-    skeleton_map: SkeletonMap
-    unit_m: float
-    up: str
-    fps: float | None
-    notes: tuple[str, ...]
-
-    def to_clip(self, bvh: BvhMotion) -> Clip:
-        return to_canonical(bvh, self.skeleton_map, unit_m=self.unit_m, fps=self.fps, up=self.up)
-
-
-def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
-    """Read a folder.
+def load(path: Path | None, progress: ProgressCallback | None = None, overrides: Overrides | None = None) -> Dataset:
+    """Read a folder; what ``overrides`` gives goes before ``stylebench.toml``.
 
     Raises
     ------
@@ -81,7 +56,8 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
     if path is None:
         raise BadData("it is read from your folder, and no path is given", where=NAME, remedy=HOW_TO_GET)
     places = bvh_places(path)
-    options = folder_options(path)
+    overrides = overrides or Overrides()
+    options = folder_options(path) | overrides.given
     files, notes = _labelled(path, options.get("pattern"), places)
     step = max(1, len(files) // LOOKED_AT)
     reading = reading_of([read_motion(path / f.place, f.place) for f in files[::step]], options, path)
@@ -105,7 +81,7 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
         licence="as stated by whoever gave you the files",
         citation="none given",
         source=path.name,
-        notes=(*reading.notes, *notes),
+        notes=(*reading.notes, *overrides.notes, *notes),
     )
 
 
@@ -197,4 +173,5 @@ ENTRY = DatasetEntry(
     licence="that of your files",
     citation="that of your files",
     how_to_get=HOW_TO_GET,
+    load_as=load,
 )

@@ -13,11 +13,9 @@ from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_takes
+from bench.datasets.reading import Overrides, facts_of, known_reading
 from bench.errors import BadData
-from bench.motion.bvh import BvhMotion
-from bench.motion.clip import Clip
 from bench.motion.known_skeletons import XSENS
-from bench.motion.retarget import to_canonical
 
 NAME = "100style"
 GAITS = {
@@ -36,7 +34,7 @@ CUTS_CSV = "Frame_Cuts.csv"
 PUBLISHED_FILES, PUBLISHED_STYLES, PUBLISHED_FRAMES = 810, 100, 4_055_978
 """Mason et al. 2022, Table 1; the frames are the sum of STOP - START over Frame_Cuts.csv."""
 PUBLISHED_TRANSITION_FRAMES = 786_818
-UNIT_M, PIECE_S = 0.01, 8.0
+UNIT, PIECE_S = "cm", 8.0
 LICENCE = "CC BY 4.0"
 CITATION = (
     "Mason, Starke, Komura 2022, Real-Time Style Modelling of Human Locomotion via Feature-Wise Transformations and "
@@ -93,7 +91,7 @@ def check_totals(cuts: Cuts) -> list[str]:
     ]
 
 
-def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
+def load(path: Path | None, progress: ProgressCallback | None = None, overrides: Overrides | None = None) -> Dataset:
     """Read a folder, at any depth; ``Frame_Cuts.csv`` must be in it.
 
     Raises
@@ -118,8 +116,10 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
     wrong = check_totals(cuts) if full else []
     if wrong:
         raise BadData("; ".join(wrong), where=str(path), cause="not the frame cuts as published", remedy=HOW_TO_GET)
-    facts = {"skeleton": XSENS.name, "unit_m": UNIT_M}
-    takes, digest = read_takes(path, files, _to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
+    overrides = overrides or Overrides()
+    reading = known_reading(XSENS, UNIT, overrides)
+    facts = facts_of(reading, overrides)
+    takes, digest = read_takes(path, files, reading.to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
     left = len(places) - len(files)
     return Dataset(
         name=NAME,
@@ -132,6 +132,7 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
         source=path.name,
         notes=(
             "frame totals agree with the published ones" if full else f"{len(files)} of {PUBLISHED_FILES} recordings",
+            *reading.notes,
             f"recordings are cut into takes of {PIECE_S:g} s",
             "fingers are virtual",
             *[f"{left} BVH files are not in {CUTS_CSV} and left out"] * bool(left),
@@ -157,14 +158,11 @@ def expected_files(folder: Path) -> set[str]:
     return {f"{style}_{gait}.bvh" for style, gait in read_cuts(find_cuts(folder))}
 
 
-def _to_clip(bvh: BvhMotion) -> Clip:
-    return to_canonical(bvh, XSENS, unit_m=UNIT_M)
-
-
 ENTRY = DatasetEntry(
     load=load,
     summary="captured locomotion: 8 gaits x 100 styles of one actor, 60 fps; read from your copy",
     licence=LICENCE,
     citation=CITATION,
     how_to_get=HOW_TO_GET,
+    load_as=load,
 )

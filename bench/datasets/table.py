@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bench.datasets import bandai_namco, bvh_folder, procedural, style100, xia2015, zeroeggs
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
+from bench.datasets.reading import Overrides
 from bench.errors import BadConfig, BadData
 
 DATASETS: dict[str, DatasetEntry] = {
@@ -19,12 +20,18 @@ DATASETS: dict[str, DatasetEntry] = {
 """Name on the command line -> how to load it."""
 
 
-def load_dataset(name: str, path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
+def load_dataset(
+    name: str, path: Path | None, progress: ProgressCallback | None = None, overrides: Overrides | None = None
+) -> Dataset:
     """Load a dataset by name.
+
+    Parameters
+    ----------
+    overrides : unit, up axis and frame rate of its files, where they are not what the files say or look like.
 
     Raises
     ------
-    BadConfig : unknown name, or a path given or missing where it should not be.
+    BadConfig : unknown name, or a path or overrides given or missing where they should not be.
     BadData, BadFile : see the dataset's own module.
     """
     entry = DATASETS.get(name)
@@ -36,7 +43,15 @@ def load_dataset(name: str, path: Path | None, progress: ProgressCallback | None
         raise BadConfig(f"dataset {name} is generated and takes no path", remedy=f"--data {name}")
     if path is not None and not path.exists():
         raise BadData(f"no such file or folder: {path}", where=f"--data {name}", remedy=entry.how_to_get)
-    return entry.load(path, progress)
+    if overrides is None or not overrides.given:
+        return entry.load(path, progress)
+    if entry.load_as is None:
+        raise BadConfig(
+            f"{', '.join(overrides.given)} of dataset {name} cannot be given",
+            cause="it is generated" if not entry.needs_path else "it is compared with digests of what was published",
+            remedy="leave it out" if not entry.needs_path else "read the folder as bvh-folder",
+        )
+    return entry.load_as(path, progress, overrides)
 
 
 def how_to_place(name: str) -> str:

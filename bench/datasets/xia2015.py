@@ -16,11 +16,9 @@ from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.bvh_files import LabelledFile, bvh_places, read_takes
+from bench.datasets.reading import Overrides, facts_of, known_reading
 from bench.errors import BadData
-from bench.motion.bvh import BvhMotion
-from bench.motion.clip import Clip
-from bench.motion.retarget import to_canonical
-from bench.motion.skeleton_maps import CMU_31, CMU_UNIT_M
+from bench.motion.skeleton_maps import CMU_31
 
 NAME = "xia2015"
 STYLES = ("angry", "childlike", "depressed", "neutral", "old", "proud", "sexy", "strutting")
@@ -105,7 +103,7 @@ def aberman_test_names(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(chosen))
 
 
-def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
+def load(path: Path | None, progress: ProgressCallback | None = None, overrides: Overrides | None = None) -> Dataset:
     """Read a folder, at any depth.
 
     Raises
@@ -125,8 +123,10 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
         raise BadData(
             f"no file is called like angry_13_000.bvh; the first is {places[0]}", where=str(path), remedy=HOW_TO_GET
         )
-    facts = {"skeleton": CMU_31.name, "unit_m": CMU_UNIT_M}
-    takes, digest = read_takes(path, files, _to_clip, facts, dataset=NAME, progress=progress)
+    overrides = overrides or Overrides()
+    reading = known_reading(CMU_31, "cmu", overrides, why="(5.6444 cm), as published")
+    facts = facts_of(reading, overrides)
+    takes, digest = read_takes(path, files, reading.to_clip, facts, dataset=NAME, progress=progress)
     left = len(places) - len(files)
     return Dataset(
         name=NAME,
@@ -139,14 +139,10 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
         source=path.name,
         notes=(
             f"{len(files)} files; the papers name {PUBLISHED_FILES}",
-            "unit 5.6444 cm and Y up, as known of these files",
+            *reading.notes,
             *[f"{left} files are mirrored copies or no files of the dataset, and left out"] * bool(left),
         ),
     )
-
-
-def _to_clip(bvh: BvhMotion) -> Clip:
-    return to_canonical(bvh, CMU_31, unit_m=CMU_UNIT_M)
 
 
 ENTRY = DatasetEntry(
@@ -155,4 +151,5 @@ ENTRY = DatasetEntry(
     licence=LICENCE,
     citation=CITATION,
     how_to_get=HOW_TO_GET,
+    load_as=load,
 )

@@ -12,12 +12,11 @@ from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_motion, read_takes
+from bench.datasets.reading import Overrides, facts_of, known_reading
 from bench.errors import BadData
-from bench.motion.bvh import BvhMotion
-from bench.motion.clip import Clip
 from bench.motion.known_skeletons import ZEROEGGS
-from bench.motion.recognise import UNITS_M, guess_unit
-from bench.motion.retarget import rest_stature, to_canonical
+from bench.motion.recognise import guess_unit
+from bench.motion.retarget import rest_stature
 
 NAME = "zeroeggs"
 CONTENT, PIECE_S = "speech", 8.0
@@ -31,7 +30,7 @@ HOW_TO_GET = (
 _FILE = re.compile(r"(?P<number>\d{3})_(?P<style>[A-Za-z]+)_\d+(?:_x_1_0)?")
 
 
-def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset:
+def load(path: Path | None, progress: ProgressCallback | None = None, overrides: Overrides | None = None) -> Dataset:
     """Read a folder, at any depth.
 
     Raises
@@ -61,14 +60,13 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
             f"no file is called like 001_Neutral_0.bvh; the first is {places[0]}", where=str(path), remedy=HOW_TO_GET
         )
     labelled = list(files.values())
-    unit = guess_unit(rest_stature(read_motion(path / labelled[0].place, labelled[0].place), ZEROEGGS))
-    unit_m = UNITS_M[unit]
-
-    def to_clip(bvh: BvhMotion) -> Clip:
-        return to_canonical(bvh, ZEROEGGS, unit_m=unit_m)
-
-    facts = {"skeleton": ZEROEGGS.name, "unit_m": unit_m}
-    takes, digest = read_takes(path, labelled, to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
+    overrides = overrides or Overrides()
+    unit = "m"
+    if overrides.unit is None:
+        unit = guess_unit(rest_stature(read_motion(path / labelled[0].place, labelled[0].place), ZEROEGGS))
+    reading = known_reading(ZEROEGGS, unit, overrides, why="assumed from the stature")
+    facts = facts_of(reading, overrides)
+    takes, digest = read_takes(path, labelled, reading.to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
     left = len(places) - len(files)
     return Dataset(
         name=NAME,
@@ -81,7 +79,7 @@ def load(path: Path | None, progress: ProgressCallback | None = None) -> Dataset
         source=path.name,
         notes=(
             f"{len(files)} of {PUBLISHED_FILES} sequences",
-            f"unit {unit} assumed from the stature",
+            *reading.notes,
             f"sequences are cut into takes of {PIECE_S:g} s",
             *[f"{left} BVH files are mirrored or changed copies and left out"] * bool(left),
         ),
@@ -94,4 +92,5 @@ ENTRY = DatasetEntry(
     licence=LICENCE,
     citation=CITATION,
     how_to_get=HOW_TO_GET,
+    load_as=load,
 )
