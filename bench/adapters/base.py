@@ -94,6 +94,11 @@ class Adapter:
     draws_from: ClassVar[str] = ""
     traits: ClassVar[Traits] = Traits()
 
+    device: str = "cpu"
+    """where ``fit`` trains: ``cpu`` or ``cuda``; set by the harness"""
+    checkpoints: Path | None = None
+    """a folder that outlives an interrupted ``fit``; set by the harness, None where there is none"""
+
     def fit(self, takes: Sequence[Take], *, seed: int, budget: str, progress: ProgressCallback) -> None:
         """Train on the fit part. Optional."""
 
