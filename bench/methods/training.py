@@ -6,6 +6,8 @@ of a checkpoint: a training that was killed and started again ends with the same
 
 from __future__ import annotations
 
+import contextlib
+import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -256,10 +258,12 @@ def _checkpoint(path: Path, trainable: Trainable, log: _Log, done: int, seconds:
         "trainable": trainable.state_dict(),
         "global": _global_state(),
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_suffix(".partial")
-    torch.save(state, draft)
-    draft.replace(path)
+    # another process at the same training writes the same states, and may be done and tidy up at any time
+    with contextlib.suppress(FileNotFoundError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = path.with_suffix(f".{os.getpid()}")
+        torch.save(state, draft)
+        draft.replace(path)
 
 
 def _resume(path: Path | None, trainable: Trainable, log: _Log) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import sys
 import threading
 import time
@@ -60,6 +61,7 @@ class Job:
     budget: str
     seed: int
     cells: tuple[GenerateJob, ...]
+    device: str = "cpu"
 
     @classmethod
     def read(cls, path: Path) -> Job:
@@ -139,11 +141,14 @@ def _fit(job: Job, adapter: Adapter, pack: Pack, store: Store, send: Send) -> No
     def write(folder: Path) -> dict[str, Any]:
         started = time.perf_counter()
         takes = [_fit_view(pack.take(take_id)) for take_id in job.fit_take_ids]
+        adapter.device, adapter.checkpoints = job.device, checkpoints
         adapter.fit(takes, seed=job.seed, budget=job.budget, progress=progress)
         adapter.save(folder)
         return {"wall_s": time.perf_counter() - started, "budget": job.budget, "seed": job.seed}
 
+    checkpoints = store.folder("checkpoints", job.fit_key)
     store.put("fit", job.fit_key, write)
+    shutil.rmtree(checkpoints, ignore_errors=True)
 
 
 def _fit_view(take: Take) -> Take:
