@@ -95,8 +95,8 @@ def nearest_distance(
 
     Parameters
     ----------
-    query_groups, bank_groups : ``[n]`` and ``[m]`` integers, both or none: rows of a query's own group (the take it
-        was cut from) are passed over.
+    query_groups, bank_groups : ``[n]`` or ``[n, g]``, and ``[m]`` integers, both or none: rows of a query's own groups
+        (the takes it was made from) are passed over.
 
     Raises
     ------
@@ -117,7 +117,8 @@ def nearest_distance(
         squared += bank_squares
         squared += query_squares
         if own is not None:
-            squared[own[0][part, None] == own[1]] = np.inf
+            for group in own[0][part].T:
+                squared[group[:, None] == own[1]] = np.inf
         best = squared.min(axis=1, keepdims=True)
         _refuse_empty(best, first)
         slack = 2.0 * EXPANSION_ERROR * (query_squares + bank_squares.max())
@@ -176,6 +177,8 @@ def copied(distances: ArrayLike, threshold: float) -> BoolArray:
 def neighbour_ratio(given_distances: ArrayLike, unseen_distances: ArrayLike) -> float:
     """Median nearest distance of outputs to given motion over that to unseen real motion (1 ideal, below 1 memorised).
 
+    The larger bank has the nearer neighbours by chance: give both the same size.
+
     Raises
     ------
     BadInput : NaN, negative distances, a median of zero to unseen motion.
@@ -230,7 +233,12 @@ def _checked_groups(
     if bank_groups is None or query_groups is None:
         missing = "bank_groups" if bank_groups is None else "query_groups"
         raise BadInput(f"{missing} is missing: give both groups or none", where=missing)
-    return check_labels(query_groups, "query_groups", n_queries), check_labels(bank_groups, "bank_groups", n_bank)
+    groups = np.asarray(query_groups)
+    columns = groups[:, None] if groups.ndim == 1 else groups
+    if columns.ndim != 2 or 0 in columns.shape:
+        raise BadInput(f"query_groups must be [n] or [n, g], got {list(groups.shape)}", where="query_groups")
+    own = [check_labels(column, "query_groups", n_queries) for column in columns.T]
+    return np.stack(own, axis=1), check_labels(bank_groups, "bank_groups", n_bank)
 
 
 def _checked_distances(values: ArrayLike, name: str) -> FloatArray:

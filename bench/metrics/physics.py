@@ -1,4 +1,4 @@
-"""Physics of outputs: smoothness, timing, bones, feet.
+"""Physics of outputs: smoothness, timing, bones, root path. Feet are in ``contacts``, joint angles in ``joint_range``.
 
 Conventions: positions are ``[n, T, J, 3]`` metres in the world frame, Y up, joint 0 the root; every metric gives one
 value a sample ``[n]``; real motion, or the source, comes first. ``joints`` lists the joints that count: leave virtual
@@ -8,8 +8,7 @@ joints out of it. A value that is undefined for a sample is NaN.
 - ``ratio_to_reference``, ``ratio_per_content``: either of them over that of real motion (jerk ratio, speed ratio).
 - ``time_correlation``: does the output move when its source moves?
 - ``bone_drift`` (%): do bones keep their length?
-- ``foot_skate`` (cm/s): sliding while in contact with an estimated floor. ``skate_gmd``: the published ratio (%).
-- ``penetration``, ``float_height`` (cm): the lowest foot under and over the floor.
+- ``root_path_error`` (cm): how far the root's way over the floor is from the source's.
 """
 
 from __future__ import annotations
@@ -18,18 +17,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import uniform_filter1d
 
-from bench.arrays import BoolArray, FloatArray, finite_array
+from bench.arrays import FloatArray, finite_array
 from bench.errors import BadInput
+from bench.metrics.checks import checked_fps, checked_joints, checked_positions
 from bench.metrics.conditional import check_labels
 
 MIN_MOVEMENT_M = 1e-6
 MIN_BONE_M = 1e-3
-CONTACT_STARTS_BELOW_M = 0.03
-CONTACT_ENDS_ABOVE_M = 0.05
-FLOOR_QUANTILE = 0.05
-GMD_HEIGHT_M, GMD_SPEED_M_S, GMD_WINDOW_FRAMES = 0.05, 0.5, 5
 
 
 def jerk_per_sample(positions_m: ArrayLike, fps: float, *, joints: Sequence[int] | None = None) -> FloatArray:
@@ -39,8 +34,8 @@ def jerk_per_sample(positions_m: ArrayLike, fps: float, *, joints: Sequence[int]
     ------
     BadInput : not ``[n, T, J, 3]``, fewer than 4 frames, NaN, fps not positive, joints that do not exist.
     """
-    positions = _checked_positions(positions_m, "positions_m", joints, min_frames=4)
-    return _mean_length_of_differences(positions, _checked_fps(fps), order=3)
+    positions = checked_positions(positions_m, "positions_m", joints, min_frames=4)
+    return _mean_length_of_differences(positions, checked_fps(fps), order=3)
 
 
 def speed_per_sample(positions_m: ArrayLike, fps: float, *, joints: Sequence[int] | None = None) -> FloatArray:
@@ -50,8 +45,8 @@ def speed_per_sample(positions_m: ArrayLike, fps: float, *, joints: Sequence[int
     ------
     BadInput : as ``jerk_per_sample``, but 2 frames are enough.
     """
-    positions = _checked_positions(positions_m, "positions_m", joints, min_frames=2)
-    return _mean_length_of_differences(positions, _checked_fps(fps), order=1)
+    positions = checked_positions(positions_m, "positions_m", joints, min_frames=2)
+    return _mean_length_of_differences(positions, checked_fps(fps), order=1)
 
 
 def ratio_to_reference(reference: ArrayLike, output: ArrayLike) -> float:
@@ -100,8 +95,8 @@ def time_correlation(
     ------
     BadInput : shapes that differ, fewer than 2 frames, NaN, joints that do not exist.
     """
-    source = _checked_positions(source_positions_m, "source_positions_m", joints, min_frames=2, root_relative=True)
-    output = _checked_positions(output_positions_m, "output_positions_m", joints, min_frames=2, root_relative=True)
+    source = checked_positions(source_positions_m, "source_positions_m", joints, min_frames=2, root_relative=True)
+    output = checked_positions(output_positions_m, "output_positions_m", joints, min_frames=2, root_relative=True)
     if source.shape != output.shape:
         raise BadInput(
             f"output_positions_m must match the source's {list(source.shape)}, got {list(output.shape)}",
@@ -139,7 +134,7 @@ def bone_drift(
     ------
     BadInput : shapes that do not fit, NaN, no bone left to count.
     """
-    positions = _checked_positions(positions_m, "positions_m", None, min_frames=1)
+    positions = checked_positions(positions_m, "positions_m", None, min_frames=1)
     n, _, n_joints, _ = positions.shape
     if len(parents) != n_joints:
         raise BadInput(f"parents must name {n_joints} joints, got {len(parents)}", where="parents")
@@ -147,7 +142,7 @@ def bone_drift(
     reference = finite_array(
         np.tile(reference, (n, 1)) if reference.ndim == 1 else reference, "reference_lengths_m", (n, n_joints)
     )
-    kept = [j for j in _checked_joints(joints, n_joints) if parents[j] >= 0]
+    kept = [j for j in checked_joints(joints, n_joints) if parents[j] >= 0]
     counted = reference[:, kept] >= MIN_BONE_M
     if not kept or not counted.any(axis=1).all():
         raise BadInput("no bone of at least 1 mm is left to count", where="joints")
@@ -157,94 +152,27 @@ def bone_drift(
     return np.asarray(100.0 * np.where(counted, drift, 0.0).sum(axis=1) / counted.sum(axis=1))
 
 
-def estimated_floor(positions_m: ArrayLike, foot_joints: Sequence[int]) -> FloatArray:
-    """Height of the floor under each sample: ``[n]`` metres.
+def root_path_error(source_root_xyz_m: ArrayLike, output_root_xyz_m: ArrayLike) -> FloatArray:
+    """Mean horizontal distance of the output's root from its source's, after alignment: ``[n]`` cm.
 
-    The 5 % quantile over time of the height of the lowest foot joint: the lowest frames, but not a single bad one.
+    The output's path is turned about the vertical and moved over the floor so that it lies on the source's as well as
+    it can (least squares), as in the absolute trajectory error of Sturm 2012; neither is scaled.
 
-    Raises
-    ------
-    BadInput : not ``[n, T, J, 3]``, NaN, joints that do not exist.
-    """
-    feet = _checked_positions(positions_m, "positions_m", foot_joints, min_frames=1)
-    return np.asarray(np.quantile(feet[..., 1].min(axis=2), FLOOR_QUANTILE, axis=1))
-
-
-def foot_skate(positions_m: ArrayLike, fps: float, foot_joints: Sequence[int]) -> FloatArray:
-    """Mean horizontal speed of foot joints while they are in contact with the estimated floor: ``[n]`` cm/s.
-
-    Contact is decided by height alone, so that fast sliding cannot hide: it starts under 3 cm and ends over 5 cm. NaN
-    where no foot touches the floor in two consecutive frames.
+    Parameters
+    ----------
+    source_root_xyz_m, output_root_xyz_m : ``[n, T, 3]``, metres.
 
     Raises
     ------
-    BadInput : fewer than 2 frames, NaN, joints that do not exist, fps not positive.
+    BadInput : shapes that differ, NaN.
     """
-    feet = _checked_positions(positions_m, "positions_m", foot_joints, min_frames=2)
-    height = feet[..., 1] - estimated_floor(positions_m, foot_joints)[:, None, None]
-    contact = _held_contact(height < CONTACT_STARTS_BELOW_M, height > CONTACT_ENDS_ABOVE_M)
-    standing = contact[:, 1:] & contact[:, :-1]
-    speed_cm_s = 100.0 * _checked_fps(fps) * np.linalg.norm(np.diff(feet[..., (0, 2)], axis=1), axis=-1)
-    frames = standing.sum(axis=(1, 2))
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(standing, speed_cm_s, 0.0).sum(axis=(1, 2)) / frames)
-
-
-def skate_gmd(positions_m: ArrayLike, fps: float, toe_joints: Sequence[int]) -> FloatArray:
-    """Share of frames in which a toe skates: ``[n]`` percent, in the form of GMD (Karunratanakul 2023, section 5).
-
-    A toe skates where it is under 5 cm in two consecutive frames and faster than 0.5 m/s, both now and on average
-    over 5 frames (zeros beyond the ends, as in the released code). Heights count from 0, not from an estimated floor.
-
-    Raises
-    ------
-    BadInput : fewer than 2 frames, NaN, joints that do not exist, fps not positive.
-    """
-    toes = _checked_positions(positions_m, "positions_m", toe_joints, min_frames=2)
-    speed = _checked_fps(fps) * np.linalg.norm(np.diff(toes[..., (0, 2)], axis=1), axis=-1)
-    average = uniform_filter1d(speed, GMD_WINDOW_FRAMES, axis=1, mode="constant")
-    low = toes[..., 1] < GMD_HEIGHT_M
-    skating = low[:, 1:] & low[:, :-1] & (speed > GMD_SPEED_M_S) & (average > GMD_SPEED_M_S)
-    return np.asarray(100.0 * skating.any(axis=2).mean(axis=1))
-
-
-def penetration(positions_m: ArrayLike, foot_joints: Sequence[int], *, floor_m: float = 0.0) -> FloatArray:
-    """Mean over frames of how far the lowest foot joint is under the floor: ``[n]`` cm.
-
-    Raises
-    ------
-    BadInput : not ``[n, T, J, 3]``, NaN, joints that do not exist.
-    """
-    return _mean_positive_cm(floor_m - _lowest_foot(positions_m, foot_joints))
-
-
-def float_height(positions_m: ArrayLike, foot_joints: Sequence[int], *, floor_m: float = 0.0) -> FloatArray:
-    """Mean over frames of how far the lowest foot joint is over the floor: ``[n]`` cm. Jumps count, so compare with
-    the source.
-
-    Raises
-    ------
-    BadInput : as ``penetration``.
-    """
-    return _mean_positive_cm(_lowest_foot(positions_m, foot_joints) - floor_m)
-
-
-def _lowest_foot(positions_m: ArrayLike, foot_joints: Sequence[int]) -> FloatArray:
-    feet = _checked_positions(positions_m, "positions_m", foot_joints, min_frames=1)
-    return np.asarray(feet[..., 1].min(axis=2))
-
-
-def _mean_positive_cm(heights_m: FloatArray) -> FloatArray:
-    return np.asarray(100.0 * np.clip(heights_m, 0.0, None).mean(axis=1))
-
-
-def _held_contact(starts: BoolArray, ends: BoolArray) -> BoolArray:
-    """Contact ``[n, T, F]`` that begins with ``starts`` and lasts until ``ends``."""
-    contact = np.empty_like(starts)
-    contact[:, 0] = starts[:, 0]
-    for frame in range(1, starts.shape[1]):
-        contact[:, frame] = (contact[:, frame - 1] | starts[:, frame]) & ~ends[:, frame]
-    return contact
+    source = finite_array(source_root_xyz_m, "source_root_xyz_m", (None, None, 3))
+    output = finite_array(output_root_xyz_m, "output_root_xyz_m", source.shape)
+    wanted, found = (path[..., 2] + 1j * path[..., 0] for path in (source, output))
+    wanted, found = (path - path.mean(axis=1, keepdims=True) for path in (wanted, found))
+    overlap = (wanted * found.conj()).sum(axis=1, keepdims=True)
+    turned = found * np.exp(1j * np.angle(overlap))
+    return np.asarray(100.0 * np.abs(wanted - turned).mean(axis=1))
 
 
 def _mean_length_of_differences(positions: FloatArray, fps: float, *, order: int) -> FloatArray:
@@ -252,33 +180,6 @@ def _mean_length_of_differences(positions: FloatArray, fps: float, *, order: int
     return np.array(
         [np.linalg.norm(np.diff(sample, n=order, axis=0), axis=-1).mean() * fps**order for sample in positions]
     )
-
-
-def _checked_positions(
-    positions_m: ArrayLike, name: str, joints: Sequence[int] | None, *, min_frames: int, root_relative: bool = False
-) -> FloatArray:
-    positions = finite_array(positions_m, name, (None, None, None, 3))
-    if positions.shape[1] < min_frames:
-        raise BadInput(f"{name} must have at least {min_frames} frames, got {positions.shape[1]}", where=name)
-    kept = _checked_joints(joints, positions.shape[2])
-    if root_relative:
-        positions = positions - positions[:, :, :1]
-    return positions if joints is None else positions[:, :, kept]
-
-
-def _checked_joints(joints: Sequence[int] | None, n_joints: int) -> list[int]:
-    if joints is None:
-        return list(range(n_joints))
-    kept = [int(j) for j in joints]
-    if not kept or len(set(kept)) != len(kept) or not all(0 <= j < n_joints for j in kept):
-        raise BadInput(f"joints must be different indices in 0..{n_joints - 1}, got {kept}", where="joints")
-    return kept
-
-
-def _checked_fps(fps: float) -> float:
-    if not np.isfinite(fps) or fps <= 0.0:
-        raise BadInput(f"fps must be positive, got {fps}", where="fps")
-    return float(fps)
 
 
 def _checked_magnitudes(values: ArrayLike, name: str) -> FloatArray:

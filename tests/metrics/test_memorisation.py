@@ -74,6 +74,18 @@ def test_own_group_is_passed_over_or_searched_alone() -> None:
     assert shuffled.tolist() == within.tolist()
 
 
+def test_several_own_groups_are_passed_over() -> None:
+    bank, groups = np.array([[0.0], [1.0], [7.0], [9.0]]), np.array([5, 6, 8, 8])
+    own = np.array([[5, 6], [8, 6], [3, 3]])
+    assert nearest_distance([[0.0], [8.5], [0.2]], bank, query_groups=own, bank_groups=groups) == pytest.approx(
+        [7.0, 8.5, 0.2]
+    )
+    np.testing.assert_array_equal(
+        nearest_distance(bank, bank, query_groups=groups[:, None], bank_groups=groups),
+        nearest_distance(bank, bank, query_groups=groups, bank_groups=groups),
+    )
+
+
 def test_distance_grows_as_the_copy_is_disturbed() -> None:
     rng = np.random.default_rng(3)
     bank = rng.normal(size=(50, 20))
@@ -119,6 +131,10 @@ def test_refusals() -> None:
         nearest_distance(rows[:, :3], rows)
     with pytest.raises(BadInput, match="query_groups is missing"):
         nearest_distance(rows, rows, bank_groups=[0, 0, 0])
+    with pytest.raises(BadInput, match=r"query_groups must be \[n\] or \[n, g\], got \[1, 1, 1\]"):
+        nearest_distance(rows, rows, query_groups=[[[0]]], bank_groups=[0, 0, 0])
+    with pytest.raises(BadInput, match=r"query_groups must have shape \[3\], got \[2\]"):
+        nearest_distance(rows, rows, query_groups=[0, 1], bank_groups=[0, 0, 0])
     with pytest.raises(BadInput, match="query 1 has no row left in the bank"):
         nearest_distance(rows, rows, query_groups=[1, 0, 0], bank_groups=[0, 0, 0])
     with pytest.raises(BadInput, match="group 2 has no row in the bank"):

@@ -11,14 +11,10 @@ from bench.arrays import FloatArray
 from bench.errors import BadInput
 from bench.metrics.physics import (
     bone_drift,
-    estimated_floor,
-    float_height,
-    foot_skate,
     jerk_per_sample,
-    penetration,
     ratio_per_content,
     ratio_to_reference,
-    skate_gmd,
+    root_path_error,
     speed_per_sample,
     time_correlation,
 )
@@ -150,83 +146,6 @@ def test_a_bone_of_one_millimetre_counts() -> None:
     np.testing.assert_allclose(bone_drift(chain(np.array([[1.0, 0.002]])), (-1, 0, 1), 0.999 * reference), 100 / 999)
 
 
-def sliding_foot(speed_m_s: float, height_m: float = 0.0, n_frames: int = 31) -> FloatArray:
-    """Joint 0 a root overhead, joint 1 a foot that slides along x at ``height_m``, joint 2 one that stands on 0."""
-    positions = np.zeros((1, n_frames, 3, 3))
-    positions[0, :, 0, 1] = 1.0
-    positions[0, :, 1, 0] = speed_m_s * np.arange(n_frames) / FPS
-    positions[0, :, 1, 1] = height_m
-    return positions
-
-
-def test_foot_skate_by_hand() -> None:
-    np.testing.assert_allclose(foot_skate(sliding_foot(0.4), FPS, [1]), 40.0)
-    np.testing.assert_allclose(foot_skate(sliding_foot(0.4), FPS, [1, 2]), 20.0)
-    np.testing.assert_allclose(foot_skate(sliding_foot(0.4, height_m=0.2), FPS, [1, 2]), 0.0)
-    np.testing.assert_allclose(foot_skate(turned(sliding_foot(0.4), 1.0) + 7.0, FPS, [1]), 40.0)
-    assert (np.diff([foot_skate(sliding_foot(v), FPS, [1])[0] for v in (0.0, 0.2, 5.0)]) > 0).all()
-
-
-def test_contact_holds_between_its_two_heights() -> None:
-    positions = sliding_foot(0.3, n_frames=40)
-    positions[0, :, 1, 1] = np.repeat([0.10, 0.04, 0.0, 0.04], 10)
-    # Coming down at 4 cm is no contact; going up it still is: 19 of the 39 steps slide, the standing foot adds 39.
-    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 30.0 * 19 / (19 + 39))
-
-
-def test_contact_begins_under_three_and_ends_over_five_centimetres() -> None:
-    positions = sliding_foot(0.3, height_m=0.03, n_frames=40)
-    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 0.0)
-    positions[0, :, 1, 1] = np.repeat([0.0, 0.05], 20)
-    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 15.0)
-    landing = sliding_foot(0.0)
-    landing[0, 0, 1] = -1.0, 0.2, 0.0
-    np.testing.assert_allclose(foot_skate(landing, FPS, [1]), 0.0)
-    positions[0, 20:, 1, 1] = 0.051
-    np.testing.assert_allclose(foot_skate(positions, FPS, [1, 2]), 30.0 * 19 / (19 + 39))
-
-
-def test_no_contact_is_nan() -> None:
-    positions = sliding_foot(0.3, n_frames=2)
-    positions[0, :, 1, 1] = [0.0, 1.0]
-    assert np.isnan(foot_skate(positions, FPS, [1])).all()
-
-
-def test_skate_gmd_by_hand() -> None:
-    # 30 steps at 1 m/s; zeros beyond the ends leave averages of 0.6, 0.8, 1, ..., all over 0.5.
-    np.testing.assert_allclose(skate_gmd(sliding_foot(1.0), FPS, [1, 2]), 100.0)
-    np.testing.assert_allclose(skate_gmd(sliding_foot(0.49), FPS, [1, 2]), 0.0)
-    np.testing.assert_allclose(skate_gmd(sliding_foot(1.0, height_m=0.06), FPS, [1, 2]), 0.0)
-    # At 0.6 m/s the averages at the ends are 0.36 and 0.48: two steps at each end do not count.
-    np.testing.assert_allclose(skate_gmd(sliding_foot(0.6), FPS, [1, 2]), 100.0 * 26 / 30)
-
-
-def test_skate_gmd_at_its_thresholds() -> None:
-    """A frame skates over 0.5 m/s, now and on average over 5 (0.5 at the ends), under 5 cm now and before."""
-    for speeds, share in (([1.0, 1.0, 0.5, 1.0, 1.0], 40.0), ([0.0, 0.5, 1.0, 0.5, 0.5], 0.0)):
-        positions = np.zeros((1, 6, 1, 3))
-        positions[0, 1:, 0, 0] = np.cumsum(speeds)
-        np.testing.assert_allclose(skate_gmd(positions, 1.0, [0]), share)
-    diagonal = sliding_foot(0.4)
-    diagonal[0, :, 1, 2] = diagonal[0, :, 1, 0]
-    np.testing.assert_allclose(skate_gmd(diagonal, FPS, [1, 2]), 100.0 * 26 / 30)
-    positions = sliding_foot(1.0)
-    positions[0, 10:, 1, 1] = 0.05
-    np.testing.assert_allclose(skate_gmd(positions, FPS, [1]), 100.0 * 9 / 30)
-
-
-def test_floor_penetration_and_float() -> None:
-    positions = sliding_foot(0.0, n_frames=100)
-    positions[0, :, 1:, 1] = np.repeat([0.10, -0.02], 50)[:, None]
-    np.testing.assert_allclose(estimated_floor(positions, [1, 2]), -0.02)
-    np.testing.assert_allclose(penetration(positions, [1, 2]), 1.0)
-    np.testing.assert_allclose(float_height(positions, [1, 2]), 5.0)
-    np.testing.assert_allclose(penetration(positions, [1, 2], floor_m=0.10), 6.0)
-    np.testing.assert_allclose(float_height(positions, [1, 2], floor_m=-0.02), 6.0)
-    positions[0, 0, 1, 1] = -5.0
-    assert estimated_floor(positions, [1, 2])[0] > -0.05
-
-
 def test_speed_ignores_place_and_turn_and_grows_with_the_motion() -> None:
     motion = some_motion()
     plain = speed_per_sample(motion, FPS)
@@ -245,42 +164,11 @@ def test_ratios_ignore_the_order_of_samples_and_common_units() -> None:
     assert ratio_per_content(real, contents, real, contents) == {0: 1.0, 1: 1.0, 2: 1.0}
 
 
-def test_feet_on_the_floor_are_perfect_and_faults_add_up() -> None:
-    still = sliding_foot(0.0)
-    for value in (foot_skate(still, FPS, [1, 2]), skate_gmd(still, FPS, [1, 2])):
-        assert value.tolist() == [0.0]
-    assert penetration(still, [1, 2]).tolist() == float_height(still, [1, 2]).tolist() == [0.0]
-    heights = (0.0, 0.01, 0.05, 0.2)
-    deep = [penetration(sliding_foot(0.0, height_m=-h), [1])[0] for h in heights]
-    high = [float_height(sliding_foot(0.0, height_m=h), [1])[0] for h in heights]
-    np.testing.assert_allclose(deep, high)
-    np.testing.assert_allclose(deep, [0.0, 1.0, 5.0, 20.0])
-    shares = []
-    for frames in (0, 10, 30):
-        positions = sliding_foot(1.0)
-        positions[0, frames:, 1, 0] = positions[0, frames, 1, 0]
-        shares.append(skate_gmd(positions, FPS, [1, 2])[0])
-    assert shares[0] == 0.0 < shares[1] < shares[2]
-
-
-def test_feet_ignore_where_on_the_floor_and_which_way() -> None:
-    positions = sliding_foot(0.8)
-    moved = turned(positions, 1.2) + np.array([3.0, 0.0, -4.0])
-    for measure in (skate_gmd, foot_skate):
-        np.testing.assert_allclose(measure(moved, FPS, [1, 2]), measure(positions, FPS, [1, 2]))
-    sunk = turned(sliding_foot(0.8, height_m=-0.03), 1.2) + np.array([3.0, 0.0, -4.0])
-    np.testing.assert_allclose(penetration(sunk, [1]), 3.0)
-    np.testing.assert_allclose(estimated_floor(sunk, [1]), -0.03)
-    np.testing.assert_allclose(float_height(sunk, [1], floor_m=-0.05), 2.0)
-
-
 def bad_fps(fps: float) -> list[Callable[[], object]]:
     motion = some_motion()
     return [
         lambda: jerk_per_sample(motion, fps),
         lambda: speed_per_sample(motion, fps),
-        lambda: foot_skate(motion, fps, [1]),
-        lambda: skate_gmd(motion, fps, [1]),
     ]
 
 
@@ -295,11 +183,6 @@ POSITION_FUNCTIONS: list[tuple[Callable[[FloatArray], object], int]] = [
     (lambda p: jerk_per_sample(p, FPS), 4),
     (lambda p: speed_per_sample(p, FPS), 2),
     (lambda p: bone_drift(p, (-1, 0, 1, 2, 3), np.ones(5)), 1),
-    (lambda p: estimated_floor(p, [1]), 1),
-    (lambda p: foot_skate(p, FPS, [1]), 2),
-    (lambda p: skate_gmd(p, FPS, [1]), 2),
-    (lambda p: penetration(p, [1]), 1),
-    (lambda p: float_height(p, [1]), 1),
 ]
 
 
@@ -324,11 +207,6 @@ JOINT_FUNCTIONS: list[Callable[[FloatArray, list[int]], object]] = [
     lambda p, joints: speed_per_sample(p, FPS, joints=joints),
     lambda p, joints: time_correlation(p, p, joints=joints),
     lambda p, joints: bone_drift(p, (-1, 0, 1, 2, 3), np.ones(5), joints=joints),
-    estimated_floor,
-    lambda p, joints: foot_skate(p, FPS, joints),
-    lambda p, joints: skate_gmd(p, FPS, joints),
-    penetration,
-    float_height,
 ]
 
 
@@ -397,5 +275,47 @@ def test_refusals() -> None:
         bone_drift(motion, (-1, 0, 1, 2, 3), np.zeros(5))
     with pytest.raises(BadInput, match=r"reference_lengths_m must have shape \[3, 5\]"):
         bone_drift(motion, (-1, 0, 1, 2, 3), np.ones(4))
-    with pytest.raises(BadInput, match="joints must be different indices"):
-        foot_skate(motion, FPS, [])
+
+
+def path(*points_zx: tuple[float, float]) -> FloatArray:
+    """A root path ``[1, T, 3]`` over the floor from z, x in metres."""
+    z, x = np.array(points_zx).T
+    return np.stack([x, np.ones_like(x), z], axis=-1)[None]
+
+
+def test_root_path_error_by_hand() -> None:
+    # Twice as far along a line: centred, the ends are 0.5 m off and the middle is right.
+    source, output = path((0, 0), (0.5, 0), (1, 0)), path((0, 0), (1, 0), (2, 0))
+    np.testing.assert_allclose(root_path_error(source, output), 100.0 * (0.5 + 0.0 + 0.5) / 3)
+    np.testing.assert_allclose(root_path_error(output, source), root_path_error(source, output))
+
+
+def test_root_path_error_ignores_where_and_which_way_and_height_but_not_scale_or_mirror() -> None:
+    rng = np.random.default_rng(7)
+    source = rng.normal(size=(4, 30, 3)).cumsum(axis=1) * 0.01
+    np.testing.assert_allclose(
+        root_path_error(source, turned(source, 2.1) + np.array([5.0, 0.3, -2.0])), 0.0, atol=1e-9
+    )
+    faults = [root_path_error(source, source * scale).mean() for scale in (1.0, 1.2, 1.5, 2.0)]
+    assert faults[0] == pytest.approx(0.0, abs=1e-9) and (np.diff(faults) > 0).all()
+    assert (root_path_error(source, source * [-1.0, 1.0, 1.0]) > 0.1).all()
+
+
+def test_root_path_error_is_the_least_over_all_turns() -> None:
+    rng = np.random.default_rng(8)
+    source, output = rng.normal(size=(2, 1, 20, 3))
+    centred = [p - p.mean(axis=1, keepdims=True) for p in (source, output)]
+    squares = [((centred[0] - turned(centred[1], yaw))[..., (0, 2)] ** 2).sum() for yaw in np.linspace(0, 6.283, 3600)]
+    best = turned(centred[1], np.linspace(0, 6.283, 3600)[np.argmin(squares)])
+    expected = 100.0 * np.linalg.norm((centred[0] - best)[..., (0, 2)], axis=-1).mean()
+    np.testing.assert_allclose(root_path_error(source, output), expected, rtol=1e-4)
+
+
+def test_root_path_error_refuses_what_does_not_fit() -> None:
+    good = path((0, 0), (1, 0))
+    with pytest.raises(BadInput, match=r"source_root_xyz_m must have shape \[any, any, 3\], got \[2, 3\]"):
+        root_path_error(good[0], good)
+    with pytest.raises(BadInput, match=r"output_root_xyz_m must have shape \[1, 2, 3\], got \[1, 1, 3\]"):
+        root_path_error(good, good[:, 1:])
+    with pytest.raises(BadInput, match="output_root_xyz_m must be finite"):
+        root_path_error(good, good * np.nan)
