@@ -18,7 +18,7 @@ from bench.motion.clip import Clip
 from bench.motion.edit import crop, on_floor
 from bench.motion.recognise import with_bare_names
 
-READER_VERSION = 1
+READER_VERSION = 2
 
 
 @dataclass(frozen=True)

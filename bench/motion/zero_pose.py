@@ -3,7 +3,9 @@
 In many files all rotations zero is a person who stands: arms out or hanging aslant, legs straight or spread, along any
 axes. The up axis is the signed axis nearest to Hips -> Head, the left axis the one nearest to right -> left upper leg;
 one rotation brings both to Y and X. Then arms and legs get the least turn that brings each bone to its direction in the
-canonical T-pose. Feet, trunk and dropped joints keep the direction that they have. Virtual fingers follow the forearm.
+canonical T-pose, and so does a clavicle that points elsewhere than outwards, as where the arms of the zero pose are up.
+Feet, trunk and other dropped joints keep the direction that they have. Fingers turn with the hand, virtual ones with
+the forearm.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ LIMBS = (
 """Direction of a limb's bones in the canonical T-pose, and its joints."""
 MIN_AXIS_SHARE = 0.8
 """How much of a direction must lie along its nearest axis."""
+MIN_OUTWARD_SHARE = 0.7
+"""How much of a clavicle must point outwards for it to be left as it is."""
 
 
 def fitted(bvh: BvhMotion, bones: FloatArray, skeleton_map: SkeletonMap) -> SkeletonMap:
@@ -52,16 +56,34 @@ def fitted(bvh: BvhMotion, bones: FloatArray, skeleton_map: SkeletonMap) -> Skel
             if start is None:
                 continue
             end = skeleton_map.joints.get(child) if child else None
-            if end is not None:
-                bone = place[end] - place[start]
-                if np.linalg.norm(bone) > 0.0:
-                    now = quat.rotate(upright, bone / np.linalg.norm(bone))
-                    turned = quat.multiply(quat.between(now, np.asarray(direction)), upright)
-            elif joint not in ("LeftHand", "RightHand"):
+            now = None if end is None else _direction(place[end] - place[start], upright)
+            if now is not None:
+                turned = quat.multiply(quat.between(now, np.asarray(direction)), upright)
+            if end is None and joint.endswith("Foot"):
                 continue
             for name in _path(bvh, start, end):
                 t_pose[name] = turned
+        for name, child in _clavicles(bvh, skeleton_map, chain[0]):
+            now = _direction(place[child] - place[name], upright)
+            if now is not None and now @ np.asarray(direction) < MIN_OUTWARD_SHARE:
+                t_pose[name] = quat.multiply(quat.between(now, np.asarray(direction)), upright)
     return replace(skeleton_map, t_pose_wxyz={**t_pose, **skeleton_map.t_pose_wxyz})
+
+
+def _direction(bone: FloatArray, upright: FloatArray) -> FloatArray | None:
+    """Where a bone of the zero pose points once that stands upright; None for a bone without length."""
+    length = float(np.linalg.norm(bone))
+    return quat.rotate(upright, bone / length) if length > 0.0 else None
+
+
+def _clavicles(bvh: BvhMotion, skeleton_map: SkeletonMap, limb: str) -> list[tuple[str, str]]:
+    """Dropped joints between the chest and an arm, each with the joint that its bone leads to."""
+    if not limb.endswith("Arm"):
+        return []
+    chest, arm = skeleton_map.joints["Spine1"], skeleton_map.joints[limb]
+    path = _path(bvh, chest, arm)
+    dropped = path[:-1] if path[-1] == chest else []
+    return list(zip(dropped, [arm, *dropped], strict=False))
 
 
 def _positions(bvh: BvhMotion, bones: FloatArray) -> FloatArray:

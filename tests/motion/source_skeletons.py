@@ -62,7 +62,7 @@ def _depth_first(tree: Tree, joint: str) -> list[str]:
 
 
 _ARM = "*Shoulder:4,12,0 *Arm:13,0,0 *ForeArm:27,0,0 *Hand:25,0,0 *HandIndex1:9,0,0"
-_ARM_DOWN = "*Shoulder:4,12,0 *Arm:13,0,0 *ForeArm:13,-24,0 *Hand:12,-22,0"
+_ARM_UP = "*Shoulder:2.6,11.2,0 *Arm:0,10.6,0 *ForeArm:0.3,26,-0.5 *Hand:0.7,25,-0.3 *HandIndex1:0.1,10,2.3"
 _LEG = "*UpLeg:9,-3,0 *Leg:0,-42,0 *Foot:0,-41,0 *ToeBase:0,-7,13"
 _SPREAD_LEG = "*UpLeg:8,-9,4 *Leg:14,-38,0 *Foot:14,-39,0 *ToeBase:1,-3,13"
 XSENS_TREE = _tree(
@@ -75,7 +75,7 @@ MIXAMO_TREE = _tree("Hips:0,0,0 Spine:0,10,0 Spine1:0,12,0 Spine2:0,13,0 Neck:0,
 ZEROEGGS_TREE = _tree(
     "Hips:0,0,0 Spine:0,8,0 Spine1:0,9,0 Spine2:0,9,0 Spine3:0,9,0 Neck:0,16,0 Neck1:0,5,1 Head:0,5,1",
     _LEG,
-    _ARM_DOWN + " *HandIndex1:5,-8,0",
+    _ARM_UP,
     "Spine3",
 )
 CMU_21_TREE = _tree("Hips:0,0,0 Spine:0,12,0 Spine1:0,12,0 Neck1:0,10,1 Head:0,10,0", _SPREAD_LEG,

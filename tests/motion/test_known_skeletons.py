@@ -11,7 +11,7 @@ from bench.motion import quat
 from bench.motion.bvh import read_bvh
 from bench.motion.edit import mirror
 from bench.motion.kinematics import world_positions
-from bench.motion.known_skeletons import FINGERS_M, KNOWN_SKELETONS, LAFAN1, MIXAMO
+from bench.motion.known_skeletons import FINGERS_M, KNOWN_SKELETONS, LAFAN1, MIXAMO, ZEROEGGS
 from bench.motion.recognise import (
     UNITS_M,
     guess_unit,
@@ -24,7 +24,7 @@ from bench.motion.recognise import (
     with_bare_names,
 )
 from bench.motion.retarget import folding_error_m, rest_stature, to_canonical
-from bench.motion.skeleton import MIRROR_JOINTS
+from bench.motion.skeleton import CANONICAL_NAMES, MIRROR_JOINTS
 from bench.motion.skeleton_maps import CMU_31, CMU_UNIT_M
 from bench.motion.user_map import read_skeleton_map
 from tests.motion.factory import random_clip
@@ -74,6 +74,27 @@ def test_mirrored_performance_is_the_mirrored_clip(name: str) -> None:
     flipped = world_positions(ours)[:, list(MIRROR_JOINTS)] * [-1.0, 1.0, 1.0]
     np.testing.assert_allclose(world_positions(mirror(ours)), flipped, atol=1e-9)
     np.testing.assert_allclose(world_positions(theirs), flipped, atol=1e-6)
+
+
+def test_arms_that_are_up_in_the_zero_pose() -> None:
+    """ZeroEGGS: clavicles and arms run along local y, so that clavicles turned by 90 degrees about z make a T-pose."""
+    motion = on_source(random_clip(2), SOURCES["zeroeggs"])
+    values = np.zeros_like(motion.channel_values)
+    columns = [
+        (name, channel) for name, channels in zip(motion.names, motion.channels, strict=True) for channel in channels
+    ]
+    values[:, columns.index(("LeftShoulder", "Zrotation"))] = -90.0
+    values[:, columns.index(("RightShoulder", "Zrotation"))] = 90.0
+    posed = replace(motion, channel_values=values)
+    clip = to_canonical(posed, ZEROEGGS, unit_m=0.01)
+    places = world_positions(clip)[0]
+    left_arm, left_hand, left_finger = (
+        CANONICAL_NAMES.index(name) for name in ("LeftArm", "LeftHand", "LeftHandIndex1")
+    )
+    assert places[left_arm, 0] == pytest.approx(0.132, abs=1e-3)
+    assert places[left_hand, 0] - places[left_arm, 0] == pytest.approx(0.51, abs=1e-3)
+    assert quat.angle_between(clip.rotations_wxyz[0, left_finger], quat.IDENTITY) < 1e-6
+    assert np.nanmax(folding_error_m(posed, clip, ZEROEGGS, unit_m=0.01)) < 1e-6
 
 
 def test_zero_pose_along_other_axes_is_the_same_motion() -> None:
