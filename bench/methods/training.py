@@ -140,6 +140,17 @@ class Curves:
         )
 
     @classmethod
+    def one_after_the_other(cls, stages: Sequence[Curves]) -> Curves:
+        """The curves of trainings that followed each other; a loss is NaN in the stages that do not have it."""
+        names = tuple(dict.fromkeys(name for stage in stages for name in stage.names))
+        starts = np.cumsum([0, *(int(stage.steps[-1]) for stage in stages[:-1])])
+        values = [np.full((len(stage.steps), len(names)), np.nan) for stage in stages]
+        for stage, rows in zip(stages, values, strict=True):
+            rows[:, [names.index(name) for name in stage.names]] = stage.values
+        steps = [start + stage.steps for start, stage in zip(starts, stages, strict=True)]
+        return cls(names, np.concatenate(steps), np.concatenate(values), sum(stage.seconds for stage in stages))
+
+    @classmethod
     def load(cls, path: Path) -> Curves:
         """Restore what :meth:`save` stored."""
         with np.load(path, allow_pickle=False) as stored:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -28,7 +27,7 @@ from bench.methods.kuriyama2022.transformer import (
     restyled,
     whitened,
 )
-from bench.methods.training import Curves, Progress, Stateful, Trainable, seeded, train
+from bench.methods.training import Curves, FitRequest, Stateful, Trainable, seeded, train
 from bench.motion.clip import Clip
 from bench.motion.edit import mirror
 
@@ -116,27 +115,26 @@ class GestureTransfer(nn.Module):
         return clip_of(_frames_of(upper, n_frames), _frames_of(lower, n_frames), content)
 
 
-def fit(
-    takes: Sequence[Take], config: KuriyamaConfig, *, seed: int, progress: Progress, checkpoints: Path | None = None
-) -> tuple[GestureTransfer, tuple[Curves, ...]]:
-    """Train both networks on labelled takes; returned in evaluation mode with their loss curves.
+def train_gestures(config: KuriyamaConfig, request: FitRequest) -> tuple[KuriyamaConfig, GestureTransfer, Curves]:
+    """Train both networks on takes with style labels.
 
     Raises
     ------
     BadData : no takes, or takes without style labels.
     """
-    gestures = _Gestures.of(takes, config.transformer_frames)
-    with seeded(seed) as generator:
+    gestures = _Gestures.of(request.takes, max(config.autoencoder_frames, config.transformer_frames))
+    with seeded(request.seed) as generator:
         network = GestureTransfer(config)
         stages: list[tuple[Trainable, int, str]] = [
             (_AutoencoderTraining(network, gestures, generator), config.autoencoder_steps, "auto-encoder")
         ]
         if config.needs_transformer:
             stages.append((_TransformerTraining(network, gestures, generator), config.transformer_steps, "transformer"))
-        curves = []
-        for training, n_steps, name in stages:
-            curves.append(train(training, n_steps, progress=progress, name=name, checkpoints=checkpoints))
-    return network.eval(), tuple(curves)
+        curves = [
+            train(stage, n_steps, progress=request.progress, name=name, checkpoints=request.checkpoints)
+            for stage, n_steps, name in stages
+        ]
+    return config, network, Curves.one_after_the_other(curves)
 
 
 @dataclass(frozen=True, eq=False)
