@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 
 from bench.adapters import ADAPTERS
 from bench.adapters.base import Adapter
 from bench.adapters.external import external_adapter
+from bench.adapters.post_processed import post_processed, split_suffix
 from bench.errors import BadConfig, MethodFailed
+from bench.motion.cleanup import IK_SETTINGS
 
 ENTRY_POINT_GROUP = "stylebench.adapters"
 
@@ -21,7 +23,8 @@ class AdapterSource:
     """Where an adapter comes from, in a form that another process can follow.
 
     ``name`` alone means the table or an entry point; with ``file`` it is ``class_name``, or the only class, in that
-    Python file, or the outside program that this ``.toml`` describes.
+    Python file, or the outside program that this ``.toml`` describes. A suffix such as ``+park-ik`` of the name asks
+    for the adapter with its answers cleaned.
     """
 
     name: str
@@ -54,6 +57,9 @@ def find_adapter(source: AdapterSource) -> type[Adapter]:
     BadConfig : no such name, file or class, or a ``.toml`` that is not right.
     MethodFailed : the file raises when imported.
     """
+    name, suffix = split_suffix(source.name)
+    if suffix:
+        return post_processed(find_adapter(replace(source, name=name)), suffix)
     if source.file.endswith(".toml"):
         return external_adapter(Path(source.file))
     if source.file:
@@ -62,7 +68,8 @@ def find_adapter(source: AdapterSource) -> type[Adapter]:
     if source.name not in adapters:
         raise BadConfig(
             f"unknown method {source.name!r}",
-            remedy=f"choose from {', '.join(adapters)}; 'stylebench list methods' describes them",
+            remedy=f"choose from {', '.join(adapters)}, alone or with +{', +'.join(IK_SETTINGS)}; "
+            "'stylebench list methods' describes them",
         )
     return adapters[source.name]
 
@@ -70,10 +77,16 @@ def find_adapter(source: AdapterSource) -> type[Adapter]:
 def source_from_option(option: str) -> AdapterSource:
     """``FILE.py``, ``FILE.py:Class`` or a path to an ``adapter.toml`` as a source with the adapter's own name.
 
+    A suffix such as ``+park-ik`` asks for it with its answers cleaned.
+
     Raises
     ------
     BadConfig : no readable file, or not exactly one adapter in it and no class named.
     """
+    plain, suffix = split_suffix(option)
+    if suffix:
+        source = source_from_option(plain)
+        return replace(source, name=f"{source.name}+{suffix}")
     path, _, class_name = option.partition(":")
     file = Path(path).expanduser().resolve()
     if not file.is_file() or file.suffix not in (".py", ".toml"):

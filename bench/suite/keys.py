@@ -9,6 +9,7 @@ import inspect
 from functools import cache
 from pathlib import Path
 
+from bench.adapters import post_processed
 from bench.adapters.base import Adapter
 from reports.records import digest_of
 
@@ -18,8 +19,13 @@ OWN_PACKAGES = ("bench", "classifiers", "reports")
 def adapter_digest(adapter: type[Adapter]) -> str:
     """Digest of an adapter: its file and every file of this project that the file imports, directly or not.
 
-    For an outside program the files that it lists, by content alone: where they lie does not matter.
+    For an outside program the files that it lists, by content alone: where they lie does not matter. For an adapter
+    whose answers are post-processed, its own digest and that of the code behind the post-processing.
     """
+    inner = post_processed.plain(adapter)
+    if inner is not adapter:
+        own = _content_digests(Path(post_processed.__file__).resolve())
+        return digest_of({"class": adapter.name, "inner": adapter_digest(inner), "files": own})
     listed = adapter.digest_files()
     if listed:
         return digest_of({"class": adapter.name, "files": sorted(_file_digest(path) for path in listed)})
@@ -90,9 +96,14 @@ def fit_key(adapter: str, fit_part: str, budget: str, seed: int, device: str) ->
     )
 
 
-def generate_key(fit: str, tasks: str, seed: int) -> str:
-    """Key of a set of generated motions; ``fit`` is the fit key, or the adapter digest where nothing is trained."""
-    return digest_of({"stage": "generate", "fit": fit, "tasks": tasks, "seed": seed})
+def generate_key(fit: str, tasks: str, seed: int, *, after: str = "") -> str:
+    """Key of a set of generated motions; ``fit`` is the fit key, or the adapter digest where nothing is trained.
+
+    ``after`` is the adapter digest where answers are post-processed: such rows share the fit of the plain one.
+    """
+    return digest_of(
+        {"stage": "generate", "fit": fit, "tasks": tasks, "seed": seed} | ({"after": after} if after else {})
+    )
 
 
 EMBEDDING_VERSION = 2
