@@ -72,14 +72,36 @@ def verify(
 
 
 @data_app.command()
-def fetch(name: Annotated[str, typer.Argument(help="NAME")]) -> None:
-    """Say how to obtain a dataset and where to put it.
+def fetch(
+    name: Annotated[str, typer.Argument(help="NAME")],
+    out: Annotated[Path, typer.Option(help="Folder for the archives; what lies in it is checked and used.")] = Path(
+        "data"
+    ),
+    how: Annotated[bool, typer.Option("--how", help="Only say where it comes from and where to place it.")] = False,
+) -> None:
+    """Download a dataset and check its SHA-256, or say how to obtain it and where to put it.
 
-    Example: stylebench data fetch 100style
+    Example: stylebench data fetch 100style --out data
     """
-    from bench.datasets.table import how_to_place
+    from bench.datasets import fetch as fetching
+    from bench.datasets.table import entry_of, how_to_place
 
-    console.say(how_to_place(_named_path(name)[0]))
+    entry = entry_of(name)
+    if how or not entry.archives:
+        console.say(how_to_place(name))
+        if not how and entry.needs_path:
+            raise typer.Exit(1)
+        return
+    console.say(f"{name}: licence {entry.licence}; cite {entry.citation}")
+    with console.ProgressDisplay() as progress:
+        fetched = fetching.fetch(
+            name, entry, out, lambda what, done, total: progress(what.split()[0], what, done, total)
+        )
+    console.say("\n".join(f"{path}: the published archive" for path in fetched.archives))
+    if fetched.data is None:
+        console.say(f"unpack them as one archive: 7z x {fetched.archives[0]}; then give the folder as {name}=PATH")
+    else:
+        console.say(f"now: stylebench data verify {name}={fetched.data}")
 
 
 @data_app.command()

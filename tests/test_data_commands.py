@@ -82,5 +82,5 @@ def test_verify(file: Path) -> None:
 
 
 def test_fetch_says_where_to_place_it() -> None:
-    output = runner.invoke(app, ["data", "fetch", "zeroeggs"]).output
+    output = runner.invoke(app, ["data", "fetch", "zeroeggs", "--how"]).output
     assert "CC BY-NC-ND 4.0" in output and "stylebench data verify zeroeggs=PATH" in output

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
 
-from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
+from bench.datasets.base import Archive, Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.cache import Made, cached_takes
 from bench.datasets.take import Take
 from bench.errors import BadData, BadFile, BadMotion, BenchError
@@ -40,6 +40,14 @@ CITATION = (
 HOW_TO_GET = (
     "download https://github.com/BandaiNamcoResearchInc/Bandai-Namco-Research-Motiondataset and give its folder or zip"
 )
+ARCHIVE = Archive(
+    file="Bandai-Namco-Research-Motiondataset-2.zip",
+    url="https://media.githubusercontent.com/media/BandaiNamcoResearchInc/Bandai-Namco-Research-Motiondataset/"
+    "60c0ef1971398d0e62c036b7ebafa536b1152efe/dataset/Bandai-Namco-Research-Motiondataset-2/data.zip",
+    sha256="62b24dc8aa8934f2c2239746218ddbf1b004b5a238ad461330690d07ed1486bd",
+    n_bytes=126_309_261,
+)
+"""Dataset 2; the digest is that of the repository's git-lfs pointer at that commit."""
 
 
 @dataclass(frozen=True)
@@ -319,4 +327,5 @@ ENTRY = DatasetEntry(
     licence=LICENCE,
     citation=CITATION,
     how_to_get=HOW_TO_GET,
+    archives=(ARCHIVE,),
 )

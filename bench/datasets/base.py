@@ -65,6 +65,22 @@ class LoadAs(Protocol):
 
 
 @dataclass(frozen=True)
+class Archive:
+    """A published archive: its address, which names a version, and what it must be.
+
+    Attributes
+    ----------
+    file : name to keep it under.
+    sha256 : hexadecimal.
+    """
+
+    file: str
+    url: str
+    sha256: str
+    n_bytes: int
+
+
+@dataclass(frozen=True)
 class DatasetEntry:
     """A row of the DATASETS table.
 
@@ -76,6 +92,8 @@ class DatasetEntry:
     how_to_get : where to obtain it, in one sentence.
     needs_path : False for generated data.
     load_as : the same for files whose unit, up axis and frame rate may be given; None where they are fixed.
+    archives : what is downloaded; empty where there is no fixed address with a known checksum.
+    unpack : whether it is read from a folder, so that its archive must be unpacked.
     """
 
     load: Callable[[Path | None, ProgressCallback | None], Dataset]
@@ -85,3 +103,5 @@ class DatasetEntry:
     how_to_get: str = ""
     needs_path: bool = True
     load_as: LoadAs | None = None
+    archives: tuple[Archive, ...] = ()
+    unpack: bool = False

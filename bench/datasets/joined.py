@@ -11,6 +11,7 @@ from bench.motion.pose import onto_skeleton
 from bench.motion.skeleton import Skeleton
 
 BLEND_S = 0.3
+"""Seconds over which motion is blended wherever pieces are joined."""
 
 
 def joined_take(name: str, pieces: Sequence[Take], skeleton: Skeleton, fps: float, *, content: str) -> Take:

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
-from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
+from bench.datasets.base import Archive, Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_takes
 from bench.datasets.reading import Overrides, facts_of, known_reading
 from bench.errors import BadData
@@ -43,6 +43,12 @@ CITATION = (
 HOW_TO_GET = (
     "download 100STYLE from https://www.ianxmason.com/100style/ (archived as zenodo.org/record/8127870), unpack it and "
     "give the folder"
+)
+ARCHIVE = Archive(
+    file="100STYLE.zip",
+    url="https://zenodo.org/records/8127870/files/100STYLE.zip",
+    sha256="2c3b4017f8e2397ee6904c9b9f43551d8b426d39ddc3558d121fee9e55cb2d58",
+    n_bytes=1_468_515_354,
 )
 _FILE = re.compile(rf"(?P<style>[A-Za-z0-9]+)_(?P<gait>{'|'.join(GAITS)})")
 
@@ -165,4 +171,6 @@ ENTRY = DatasetEntry(
     citation=CITATION,
     how_to_get=HOW_TO_GET,
     load_as=load,
+    archives=(ARCHIVE,),
+    unpack=True,
 )

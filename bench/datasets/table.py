@@ -34,9 +34,7 @@ def load_dataset(
     BadConfig : unknown name, or a path or overrides given or missing where they should not be.
     BadData, BadFile : see the dataset's own module.
     """
-    entry = DATASETS.get(name)
-    if entry is None:
-        raise BadConfig(f"unknown dataset {name!r}", remedy=f"choose from {', '.join(DATASETS)}")
+    entry = entry_of(name)
     if entry.needs_path and path is None:
         raise BadConfig(f"dataset {name} is read from your disk", remedy=f"--data {name}=PATH; {entry.how_to_get}")
     if not entry.needs_path and path is not None:
@@ -54,6 +52,18 @@ def load_dataset(
     return entry.load_as(path, progress, overrides)
 
 
+def entry_of(name: str) -> DatasetEntry:
+    """The row of a dataset.
+
+    Raises
+    ------
+    BadConfig : unknown name.
+    """
+    if name not in DATASETS:
+        raise BadConfig(f"unknown dataset {name!r}", remedy=f"choose from {', '.join(DATASETS)}")
+    return DATASETS[name]
+
+
 def how_to_place(name: str) -> str:
     """How to obtain a dataset, where to put it and what to do then; needs no network.
 
@@ -61,13 +71,17 @@ def how_to_place(name: str) -> str:
     ------
     BadConfig : unknown name.
     """
-    entry = DATASETS.get(name)
-    if entry is None:
-        raise BadConfig(f"unknown dataset {name!r}", remedy=f"choose from {', '.join(DATASETS)}")
+    entry = entry_of(name)
     if not entry.needs_path:
         return f"{name} is generated; there is nothing to fetch"
+    source = "It is not downloaded for you, as there is no fixed address with a known checksum. Place it anywhere"
+    if entry.archives:
+        lines = "".join(f"  {archive.url}\n    as {archive.file}\n" for archive in entry.archives)
+        source = (
+            "Without network, place these in the folder that --out names and fetch again, which checks them:\n"
+            f"{lines}or place it anywhere"
+        )
     return (
-        f"{name}: {entry.how_to_get}.\nLicence: {entry.licence}.\nCite: {entry.citation}.\n"
-        f"It is not downloaded for you, as there is no address with a published checksum. Place it anywhere, then:\n"
+        f"{name}: {entry.how_to_get}.\nLicence: {entry.licence}.\nCite: {entry.citation}.\n{source}, then:\n"
         f"  stylebench data verify {name}=PATH\n  stylebench data info {name}=PATH\n  stylebench run --data {name}=PATH"
     )

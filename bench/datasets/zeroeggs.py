@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from pathlib import Path, PurePosixPath
 
-from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
+from bench.datasets.base import Archive, Dataset, DatasetEntry, ProgressCallback
 from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_motion, read_takes
 from bench.datasets.reading import Overrides, facts_of, known_reading
 from bench.errors import BadData
@@ -27,6 +27,21 @@ HOW_TO_GET = (
     "get Zeggs_data.zip, .z01 and .z02 from https://github.com/ubisoft/ubisoft-laforge-ZeroEGGS (git lfs), unpack the "
     "three as one archive and give the folder 'clean' or 'original'"
 )
+_COMMIT = "561caa8a527c014892f94c7a30ee51db15a0efde"
+ARCHIVES = tuple(
+    Archive(
+        file=file,
+        url=f"https://media.githubusercontent.com/media/ubisoft/ubisoft-laforge-ZeroEGGS/{_COMMIT}/data/{file}",
+        sha256=sha256,
+        n_bytes=n_bytes,
+    )
+    for file, sha256, n_bytes in (
+        ("Zeggs_data.zip", "edfe4037e2bf45ffade7b50bb30fe0b2f1d8776f3e8440809d5a1d1fb457d8b4", 672_547_515),
+        ("Zeggs_data.z01", "1e26f661887a19b32acb5014f412d93ea8ce3b8f6184bfb90d78a07764cdff33", 1_048_576_000),
+        ("Zeggs_data.z02", "3cc3bbe92aa5c90a4b4f0c4fbc0ba8fae7c9cceafb660b575a318c320cd6deb8", 1_048_576_000),
+    )
+)
+"""One archive in three volumes; digests are those of the repository's git-lfs pointers at that commit."""
 _FILE = re.compile(r"(?P<number>\d{3})_(?P<style>[A-Za-z]+)_\d+(?:_x_1_0)?")
 
 
@@ -93,4 +108,5 @@ ENTRY = DatasetEntry(
     citation=CITATION,
     how_to_get=HOW_TO_GET,
     load_as=load,
+    archives=ARCHIVES,
 )
