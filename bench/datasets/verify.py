@@ -1,7 +1,8 @@
 """Whether a copy of a dataset is whole: files that are changed, missing, extra or truncated, by name.
 
 Bandai-Namco is compared with the digests of its published takes, 100STYLE with the frames that its ``Frame_Cuts.csv``
-names, ZeroEGGS with its 67 numbers, a labelled folder with its ``labels.csv``. Of any folder a manifest can be written
+names, ZeroEGGS with its 67 numbers, Xia 2015 with its number of files, cells, numbering and joints, a labelled folder
+with its ``labels.csv``. Of any folder a manifest can be written
 (:func:`write_manifest`), and from then on every byte is compared with it.
 """
 
@@ -15,10 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from bench.datasets import bandai_namco, style100, xia2015, zeroeggs
-from bench.datasets.bvh_files import bvh_places
+from bench.datasets.bvh_files import bvh_places, read_motion
 from bench.datasets.labels import LABELS_CSV
 from bench.errors import BadConfig, BadData, BenchError
 from bench.motion.bvh import BvhMotion, read_bvh
+from bench.motion.recognise import match_joints
+from bench.motion.skeleton_maps import CMU_31
 
 MANIFEST = "stylebench-manifest.csv"
 COLUMNS = ("file", "bytes", "blake2b")
@@ -190,12 +193,30 @@ def _zeroeggs(path: Path, places: list[str]) -> tuple[str, list[Finding]]:
 
 
 def _xia2015(path: Path, places: list[str]) -> tuple[str, list[Finding]]:
-    extra = [place for place in places if xia2015.labels_of(PurePosixPath(place).stem) is None]
-    short = xia2015.PUBLISHED_FILES - (len(places) - len(extra))
+    stems = {place: PurePosixPath(place).stem for place in places}
+    extra = [place for place, stem in stems.items() if xia2015.labels_of(stem) is None]
     findings = [Finding(place, "extra", "not called like a take") for place in extra]
+    takes = [place for place in places if place not in extra]
+    findings += [found for place in takes for found in _other_skeleton(path, place)]
+    short = xia2015.PUBLISHED_FILES - len(takes)
     if short > 0:
+        names = [stems[place] for place in takes]
+        findings += [
+            Finding(f"{style}, {content}", "missing", "no file of this cell")
+            for content, style in xia2015.empty_cells(names)
+        ]
+        findings += [Finding(f"{name}.bvh", "missing", "its number is skipped") for name in xia2015.skipped(names)]
         findings.append(Finding(f"{short} files", "missing", f"of {xia2015.PUBLISHED_FILES}; no list of names exists"))
-    return f"the number of files, {xia2015.PUBLISHED_FILES}, and the naming schemes", findings
+    return f"the number of files, {xia2015.PUBLISHED_FILES}, their numbering, names and joints", findings
+
+
+def _other_skeleton(folder: Path, place: str) -> list[Finding]:
+    """A readable file that lacks joints of the dataset's skeleton."""
+    try:
+        match = match_joints(read_motion(folder / place, place), CMU_31)
+    except BenchError:
+        return []
+    return [Finding(place, "changed", f"lacks {', '.join(match.missing)}")] if match.missing else []
 
 
 def _labelled(path: Path, places: list[str]) -> tuple[str, list[Finding]]:

@@ -48,6 +48,7 @@ _STYLE = "|".join(STYLES)
 _BY_NUMBER = re.compile(rf"(?P<style>{_STYLE})_(?P<id>\d{{1,2}})(?:_\d+)?")
 _BY_ACTION = re.compile(rf"(?P<style>{_STYLE})_(?P<action>[a-z]+(?:_[a-z]+)?)_\d+")
 _WITH_SPACES = re.compile(rf"(?P<action>[a-z]+(?: [a-z]+)?)_(?P<style>{_STYLE})_\d+(?P<mirrored>_m)?")
+_LAST = re.compile(r"(?P<stem>.*_)(?P<number>\d+)")
 _LAST_NUMBER = (
     (12, "walking"),
     (15, "running"),
@@ -101,6 +102,28 @@ def aberman_test_names(names: Iterable[str]) -> tuple[str, ...]:
             cells[labels].append(name)
     chosen = [name for (content, _), found in cells.items() for name in found[: TEST_PER_CELL[content]]]
     return tuple(sorted(chosen))
+
+
+def empty_cells(names: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    """Contents and styles of which no name (without ``.bvh``) is a take; the full set has takes of each."""
+    there = {labels_of(name) for name in names}
+    cells = ((content, style) for style in STYLES for content in sorted(set(ACTIONS.values())))
+    return tuple(cell for cell in cells if cell not in there)
+
+
+def skipped(names: Iterable[str]) -> tuple[str, ...]:
+    """Names that the numbering of takes skips: ``old_13_001`` where ``old_13_000`` and ``old_13_002`` are there."""
+    numbers: dict[tuple[str, int], set[int]] = defaultdict(set)
+    for name in names:
+        found = _LAST.fullmatch(name)
+        if found:
+            numbers[found["stem"], len(found["number"])].add(int(found["number"]))
+    return tuple(
+        f"{stem}{number:0{width}d}"
+        for (stem, width), there in sorted(numbers.items())
+        for number in range(min(there), max(there))
+        if number not in there
+    )
 
 
 def load(path: Path | None, progress: ProgressCallback | None = None, overrides: Overrides | None = None) -> Dataset:

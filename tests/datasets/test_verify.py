@@ -95,16 +95,32 @@ def test_100style(tmp_path: Path) -> None:
     }
 
 
-def test_zeroeggs_and_xia(tmp_path: Path) -> None:
+def test_zeroeggs(tmp_path: Path) -> None:
     write(tmp_path / "zeggs" / "002_Neutral_1.bvh", "zeroeggs")
     write(tmp_path / "zeggs" / "099_Neutral_1.bvh", "zeroeggs")
     found = states(verify("zeroeggs", tmp_path / "zeggs"))
     assert found["001_*.bvh"] == "missing"
     assert found["099_Neutral_1.bvh"] == "extra"
     assert "002_*.bvh" not in found
-    write(tmp_path / "xia" / "angry_01_000.bvh", "cmu-31")
-    write(tmp_path / "xia" / "dance.bvh", "cmu-31")
-    assert states(verify("xia2015", tmp_path / "xia")) == {"dance.bvh": "extra", "571 files": "missing"}
+
+
+def test_xia_names_what_the_numbering_skips_and_other_joints(tmp_path: Path) -> None:
+    write(tmp_path / "angry_01_000.bvh", "cmu-31")
+    write(tmp_path / "angry_01_002.bvh", "cmu-31")
+    write(tmp_path / "dance.bvh", "cmu-31")
+    write(tmp_path / "old_13_000.bvh", "mixamo")
+    write(tmp_path / "old_14_000.bvh", "cmu-31")
+    truncated(tmp_path / "old_14_000.bvh")
+    found = states(verify("xia2015", tmp_path))
+    assert {file: state for file, state in found.items() if ", " not in file} == {
+        "dance.bvh": "extra",
+        "angry_01_001.bvh": "missing",
+        "568 files": "missing",
+        "old_13_000.bvh": "changed",
+        "old_14_000.bvh": "truncated",
+    }
+    assert found["sexy, jumping"] == "missing"
+    assert len([file for file in found if ", " in file]) == 6 * 8 - 2
 
 
 def test_what_cannot_be_verified(tmp_path: Path) -> None:
