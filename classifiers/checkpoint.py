@@ -16,9 +16,11 @@ from torch import Tensor, nn
 
 from classifiers.autoencoder import AutoencoderConfig, Encoder
 from classifiers.stgcn import Stgcn, StgcnConfig
+from classifiers.temporal import Temporal, TemporalConfig
 
 FORMAT = "stylebench-judge/1"
 Model = TypeVar("Model", bound=nn.Module)
+_KINDS: Mapping[type[nn.Module], str] = {Stgcn: "stgcn", Temporal: "temporal", Encoder: "autoencoder"}
 
 
 class BadCheckpoint(ValueError):
@@ -31,7 +33,7 @@ class Checkpoint:
 
     Attributes
     ----------
-    kind : ``stgcn`` or ``autoencoder``.
+    kind : ``stgcn``, ``temporal`` or ``autoencoder``.
     settings : whatever JSON the writer needs to rebuild and name the judge.
     tensors : name -> weights or buffers.
     """
@@ -96,10 +98,9 @@ def read_checkpoint(path: Path, kind: str) -> Checkpoint:
     return checkpoint
 
 
-def checkpoint_of(model: Stgcn | Encoder, judge_id: str) -> Checkpoint:
+def checkpoint_of(model: Stgcn | Temporal | Encoder, judge_id: str) -> Checkpoint:
     """What is stored of a trained network."""
-    kind = "stgcn" if isinstance(model, Stgcn) else "autoencoder"
-    return Checkpoint(kind, {"id": judge_id, "network": asdict(model.config)}, model.state_dict())
+    return Checkpoint(_KINDS[type(model)], {"id": judge_id, "network": asdict(model.config)}, model.state_dict())
 
 
 def load_classifier(path: Path) -> tuple[Stgcn, str]:
@@ -111,6 +112,18 @@ def load_classifier(path: Path) -> tuple[Stgcn, str]:
     """
     checkpoint = read_checkpoint(path, "stgcn")
     model = _fitting(path, checkpoint, lambda network: Stgcn(StgcnConfig(**network)))
+    return model, checkpoint.digest
+
+
+def load_temporal(path: Path) -> tuple[Temporal, str]:
+    """A classifier of the second family in evaluation mode and its digest.
+
+    Raises
+    ------
+    BadCheckpoint : see :func:`read_checkpoint`; also settings or weights that do not fit each other.
+    """
+    checkpoint = read_checkpoint(path, "temporal")
+    model = _fitting(path, checkpoint, lambda network: Temporal(TemporalConfig(**network)))
     return model, checkpoint.digest
 
 

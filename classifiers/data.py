@@ -96,3 +96,29 @@ class Standardise(nn.Module):
 
     def forward(self, features: Tensor) -> Tensor:
         return (self.settle_signs(features) - self.mean) / self.deviation
+
+
+class StandardisePositions(nn.Module):
+    """``[B, T, V, 3] -> [B, T, V, 3]``: joint positions, without signs to settle.
+
+    Attributes
+    ----------
+    mean, deviation : ``[V, 3]`` over samples and frames; deviation has a floor.
+    """
+
+    mean: Tensor
+    deviation: Tensor
+
+    def __init__(self, n_joints: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(n_joints, 3))
+        self.register_buffer("deviation", torch.ones(n_joints, 3))
+
+    def fit(self, positions: Tensor) -> None:
+        """Take means and deviations from ``[n, T, V, 3]``."""
+        exact = positions.double()
+        self.mean.copy_(exact.mean(dim=(0, 1)))
+        self.deviation.copy_(exact.std(dim=(0, 1), correction=0).clamp_min(DEVIATION_FLOOR))
+
+    def forward(self, positions: Tensor) -> Tensor:
+        return (positions - self.mean) / self.deviation

@@ -17,6 +17,7 @@ from torch import Tensor
 from classifiers.autoencoder import Autoencoder, Encoder, squared_half_angles
 from classifiers.data import checked_features
 from classifiers.stgcn import Stgcn
+from classifiers.temporal import Temporal
 
 FloatArray = NDArray[np.float64]
 BATCH_SIZE = 64
@@ -49,8 +50,8 @@ class Encoded:
     components: FloatArray
 
 
-def classify(model: Stgcn, windows: NDArray[np.floating]) -> Classified:
-    """Judge windows ``[n, T, V, C]``.
+def classify(model: Stgcn | Temporal, windows: NDArray[np.floating]) -> Classified:
+    """Judge windows ``[n, T, V, C]``; those of the second family hold positions only, C = 3.
 
     Raises
     ------

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -16,7 +17,9 @@ from torch.nn import functional
 from classifiers.autoencoder import Autoencoder, AutoencoderConfig, squared_half_angles
 from classifiers.data import checked_features, checked_labels
 from classifiers.stgcn import Stgcn, StgcnConfig
+from classifiers.temporal import Temporal, TemporalConfig
 
+Classifier = TypeVar("Classifier", Stgcn, Temporal)
 Progress = Callable[[int, int], None]
 """Called as ``progress(steps done, steps in total)``."""
 
@@ -81,10 +84,40 @@ def train_classifier(
     ------
     BadArray : shapes or labels that do not fit ``network``.
     """
+    return _train_classifier(lambda: Stgcn(network), features, labels, network, training, seed, progress)
+
+
+def train_temporal(
+    positions: NDArray[np.floating],
+    labels: NDArray[np.integer],
+    network: TemporalConfig,
+    training: TrainingConfig,
+    *,
+    seed: int,
+    progress: Progress | None = None,
+) -> tuple[Temporal, History]:
+    """:func:`train_classifier` for the second family, on joint positions ``[n, T, V, 3]``.
+
+    Raises
+    ------
+    BadArray : shapes or labels that do not fit ``network``.
+    """
+    return _train_classifier(lambda: Temporal(network), positions, labels, network, training, seed, progress)
+
+
+def _train_classifier(
+    build: Callable[[], Classifier],
+    features: NDArray[np.floating],
+    labels: NDArray[np.integer],
+    network: StgcnConfig | TemporalConfig,
+    training: TrainingConfig,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[Classifier, History]:
     windows = checked_features(features, network.input_shape)
     targets = checked_labels(labels, len(windows), network.n_classes)
     with seeded_single_thread(seed) as generator:
-        model = Stgcn(network)
+        model = build()
         model.standardise.fit(windows)
 
         def loss(batch: Tensor) -> Tensor:

@@ -16,6 +16,10 @@ from bench.arrays import FloatArray, IntArray
 from bench.errors import JudgeRefused
 from reports.records import digest_of
 
+CLASSIFIER_HEADER = (
+    "judge", "accuracy", "test", "real", "balanced", "majority", "chance", "n", "within session", "unseen actors",
+    "rank agreement", "parameters", "CPU s", "digest",
+)  # fmt: skip
 GATES_PERCENT = {"content": 93.0, "style": 95.0}
 """Real accuracy below which a judge is refused; native contents are reported without a gate."""
 
@@ -40,7 +44,7 @@ class Recognition(_Facts):
 
 
 class ClassifierFacts(_Facts):
-    """One ST-GCN judge."""
+    """One classifier, of either family."""
 
     id: str
     """``stgcn-content/0``: family, target and seed"""
@@ -61,6 +65,9 @@ class ClassifierFacts(_Facts):
     within_session_chance: float | None = None
     unseen_actor_accuracy: float | None = None
     """on actors that no part holds; None where the dataset has none to spare"""
+    rank_agreement: float | None = None
+    """Kendall's tau between the order in which this judge and the mean of the other family put the rows of a run, by
+    recognition of the judge's target; None where it was not measured"""
 
 
 class AutoencoderFacts(_Facts):
@@ -121,13 +128,15 @@ class JudgeCard(_Facts):
     """empty where the native contents are the judged ones"""
     classifiers: tuple[ClassifierFacts, ...]
     autoencoders: tuple[AutoencoderFacts, ...]
+    second: tuple[ClassifierFacts, ...] = ()
+    """the second family: a check on the first, no part of any number and of no digest of the judges"""
     other_splits: tuple[OtherSplit, ...] = ()
     repeats: tuple[Repeat, ...] = ()
     versions: dict[str, str]
 
     @property
     def digest(self) -> str:
-        """Digest of all judges, through their own digests."""
+        """Digest of all judges that numbers rest on, through their own digests."""
         pairs = [(judge.id, judge.digest) for judge in self.classifiers]
         return digest_of(dict(pairs + [(judge.id, judge.digest) for judge in self.autoencoders]))
 
@@ -147,15 +156,25 @@ def check_gate(card: JudgeCard) -> None:
     ------
     JudgeRefused : a content or style judge is below its gate on the test and real parts.
     """
+    refuse_poor(card.classifiers, f"{card.dataset_id}, {card.split_kind} split")
+
+
+def refuse_poor(judges: Sequence[ClassifierFacts], where: str) -> None:
+    """:func:`check_gate` for some judges.
+
+    Raises
+    ------
+    JudgeRefused : one is below its gate.
+    """
     poor = [
         f"{judge.id} {judge.pooled.accuracy:.1f} % (gate {GATES_PERCENT[judge.target]:.0f} %)"
-        for judge in card.classifiers
+        for judge in judges
         if judge.target in GATES_PERCENT and judge.pooled.accuracy < GATES_PERCENT[judge.target]
     ]
     if poor:
         raise JudgeRefused(
             f"judges get too few real windows right to score anything: {', '.join(poor)}",
-            where=f"{card.dataset_id}, {card.split_kind} split",
+            where=where,
             cause="too little data for each label, labels that windows of 64 frames cannot tell apart, or a hard split",
             remedy="merge labels that look alike, add takes, or use the default split",
         )
@@ -212,11 +231,7 @@ def to_markdown(card: JudgeCard) -> str:
         f"judges `{card.digest}`, made with {', '.join(f'{k} {v}' for k, v in sorted(card.versions.items()))}.",
         "## Classifiers",
         "Percent of real windows (test and real parts pooled) recognised.",
-        _table(
-            ("judge", "accuracy", "test", "real", "balanced", "majority", "chance", "n", "within session",
-             "unseen actors", "parameters", "CPU s", "digest"),
-            [_classifier_row(judge) for judge in card.classifiers],
-        ),
+        _table(CLASSIFIER_HEADER, [_classifier_row(judge) for judge in card.classifiers]),
         "## Auto-encoders",
         _table(
             ("judge", "angle (deg)", "32 components hold", "parameters", "CPU s", "digest"),
@@ -224,6 +239,14 @@ def to_markdown(card: JudgeCard) -> str:
               f"{a.training_seconds:.1f}", f"`{a.digest[:12]}`") for a in card.autoencoders],
         ),
     ]  # fmt: skip
+    if card.second:
+        parts += [
+            "## Second family",
+            "Convolutions over time on joint positions, trained on the same windows: a check on the first family, "
+            "never averaged in. *Rank agreement* is Kendall's tau between the order in which one judge and the mean of the "
+            "other family put the rows of a run, by recognition of the judge's target; see docs/trust.md.",
+            _table(CLASSIFIER_HEADER, [_classifier_row(judge) for judge in card.second]),
+        ]
     if card.other_splits:
         header = ("split", "target", "seed", "accuracy", "balanced", "leak", "leak by chance")
         parts += ["## Other splits", _table(header, [_other_split_row(row) for row in card.other_splits])]
@@ -246,10 +269,11 @@ def _classifier_row(judge: ClassifierFacts) -> tuple[str, ...]:
         f"{judge.within_session_accuracy:.1f} (chance {judge.within_session_chance:.0f})"
     )  # fmt: skip
     unseen = "" if judge.unseen_actor_accuracy is None else f"{judge.unseen_actor_accuracy:.1f}"
+    agreement = "" if judge.rank_agreement is None else f"{judge.rank_agreement:.2f}"
     return (
         judge.id, f"{pooled.accuracy:.2f}", f"{judge.test_accuracy:.1f}", f"{judge.real_accuracy:.1f}",
         f"{pooled.balanced_accuracy:.1f}", f"{pooled.majority_rate:.1f}", f"{pooled.chance:.1f}", str(pooled.n),
-        session, unseen, str(judge.parameters), f"{judge.training_seconds:.1f}", f"`{judge.digest[:12]}`",
+        session, unseen, agreement, str(judge.parameters), f"{judge.training_seconds:.1f}", f"`{judge.digest[:12]}`",
     )  # fmt: skip
 
 

@@ -29,9 +29,10 @@ from bench.suite.judge_card import (
 )
 from classifiers.autoencoder import Autoencoder, AutoencoderConfig, Encoder
 from classifiers.checkpoint import checkpoint_of
-from classifiers.embed import classify, encode, reconstruction_angle_deg
+from classifiers.embed import Classified, classify, encode, reconstruction_angle_deg
 from classifiers.stgcn import Stgcn, StgcnConfig
-from classifiers.train import History, TrainingConfig, train_autoencoder, train_classifier
+from classifiers.temporal import Temporal, TemporalConfig
+from classifiers.train import History, TrainingConfig, train_autoencoder, train_classifier, train_temporal
 
 WINDOW_FRAMES = 64
 STRIDE_FRAMES = 32
@@ -65,6 +66,11 @@ def centre_rotations(features: NDArray[np.floating]) -> NDArray[np.floating]:
     return features[:, CENTRE, :, JUDGE_SLICES["rotation_wxyz"]]
 
 
+def joint_positions(features: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The second family's input ``[n, 64, 21, 3]`` out of judge features ``[n, 64, 21, 7]``."""
+    return features[..., JUDGE_SLICES["position_statures"]]
+
+
 def train_all(
     dataset: Dataset,
     split: Split,
@@ -95,6 +101,32 @@ def train_all(
         classifiers=tuple(facts), autoencoders=tuple(coder_facts), versions=_versions(),
     )  # fmt: skip
     return Trained(classifiers, tuple(model.encoder for model, _ in coded), card)
+
+
+def train_second(
+    dataset: Dataset,
+    split: Split,
+    seeds: Sequence[int],
+    recipe: JudgeRecipe,
+    *,
+    unseen: Sequence[Take] = (),
+    progress: ProgressCallback | None = None,
+) -> tuple[dict[str, tuple[Temporal, ...]], tuple[ClassifierFacts, ...]]:
+    """Train the second family on the same windows and in the same way; its networks by target, and its facts."""
+    parts = _Parts.of(dataset, split, unseen)
+    nets: dict[str, tuple[Temporal, ...]] = {}
+    facts: list[ClassifierFacts] = []
+    for target in ("content", "style"):
+        runs = []
+        for seed in seeds:
+            windows, labels = _training_set(parts, dataset, target)
+            network = TemporalConfig(N_JOINTS, len(_targets(dataset)[target]))
+            step = _step_callback(progress, f"second {target} judge {seed}")
+            runs.append(train_temporal(joint_positions(windows), labels, network, recipe.classifier, seed=seed,
+                                       progress=step))  # fmt: skip
+        nets[target] = tuple(model for model, _ in runs)
+        facts += [_classifier_facts(*run, parts, target, seed) for run, seed in zip(runs, seeds, strict=True)]
+    return nets, tuple(facts)
 
 
 def measure_split(
@@ -204,16 +236,18 @@ def _targets(dataset: Dataset) -> dict[str, tuple[str, ...]]:
 def _train_classifier(
     parts: _Parts, dataset: Dataset, target: str, seed: int, recipe: JudgeRecipe, progress: ProgressCallback | None
 ) -> tuple[Stgcn, History]:
-    labels = _targets(dataset)[target]
-    sources = (parts.judge,) if _name_a_side(labels) else (parts.judge, parts.mirrored)
+    network = StgcnConfig(CANONICAL_PARENTS, len(_targets(dataset)[target]))
+    step = _step_callback(progress, f"{target} judge {seed}")
     return train_classifier(
-        np.concatenate([source.features for source in sources]),
-        np.concatenate([source.index[target] for source in sources]),
-        StgcnConfig(CANONICAL_PARENTS, len(labels)),
-        recipe.classifier,
-        seed=seed,
-        progress=_step_callback(progress, f"{target} judge {seed}"),
+        *_training_set(parts, dataset, target), network, recipe.classifier, seed=seed, progress=step
     )
+
+
+def _training_set(parts: _Parts, dataset: Dataset, target: str) -> tuple[NDArray[np.float32], IntArray]:
+    """Windows and class indices of the judge part, mirrored too unless a label names a side."""
+    sources = (parts.judge,) if _name_a_side(_targets(dataset)[target]) else (parts.judge, parts.mirrored)
+    features = np.concatenate([source.features for source in sources])
+    return features, np.concatenate([source.index[target] for source in sources])
 
 
 def _name_a_side(labels: Sequence[str]) -> bool:
@@ -229,8 +263,10 @@ def _train_autoencoder(
     return train_autoencoder(rotations, AutoencoderConfig(N_JOINTS), recipe.autoencoder, seed=seed, progress=step)
 
 
-def _classifier_facts(model: Stgcn, history: History, parts: _Parts, target: str, seed: int) -> ClassifierFacts:
-    judged = classify(model, parts.held_out)
+def _classifier_facts(
+    model: Stgcn | Temporal, history: History, parts: _Parts, target: str, seed: int
+) -> ClassifierFacts:
+    judged = _judged(model, parts.held_out)
     true = np.concatenate([parts.test.index[target], parts.real.index[target]])
     right = judged.predicted == true
     n_test = len(parts.test.features)
@@ -239,16 +275,21 @@ def _classifier_facts(model: Stgcn, history: History, parts: _Parts, target: str
         session = within_session(true, judged.log_probabilities, [*parts.test.sessions, *parts.real.sessions])
     unseen = None
     if parts.unseen is not None:
-        unseen = _percent(classify(model, parts.unseen.features).predicted == parts.unseen.index[target])
-    judge_id = f"stgcn-{target}/{seed}"
+        unseen = _percent(_judged(model, parts.unseen.features).predicted == parts.unseen.index[target])
+    family, prefix = ("temporal", "temporal-") if isinstance(model, Temporal) else ("stgcn", "")
+    judge_id = f"{family}-{target}/{seed}"
     return ClassifierFacts(
-        id=judge_id, target=target, seed=seed, file=f"{target}-{seed}.safetensors",
+        id=judge_id, target=target, seed=seed, file=f"{prefix}{target}-{seed}.safetensors",
         digest=checkpoint_of(model, judge_id).digest, parameters=model.n_parameters,
         training_seconds=history.seconds, pooled=recognition(true, judged.predicted, model.config.n_classes),
         test_accuracy=_percent(right[:n_test]), real_accuracy=_percent(right[n_test:]),
         within_session_accuracy=session[0] if session else None,
         within_session_chance=session[1] if session else None, unseen_actor_accuracy=unseen,
     )  # fmt: skip
+
+
+def _judged(model: Stgcn | Temporal, features: NDArray[np.float32]) -> Classified:
+    return classify(model, joint_positions(features) if isinstance(model, Temporal) else features)
 
 
 def _autoencoder_facts(model: Autoencoder, history: History, parts: _Parts, seed: int) -> AutoencoderFacts:

@@ -202,10 +202,10 @@ def load_judges(folder: Path, origin: Origin = "local") -> JudgeSet:
     card = read_card(folder)
     check_gate(card)
     nets = {
-        target: tuple(_loaded(folder / fact.file, fact.digest, load_classifier) for fact in card.of(target))
+        target: tuple(load_checked(folder / fact.file, fact.digest, load_classifier) for fact in card.of(target))
         for target in ("content", "style", "native")
     }
-    encoders = tuple(_loaded(folder / fact.file, fact.digest, load_encoder) for fact in card.autoencoders)
+    encoders = tuple(load_checked(folder / fact.file, fact.digest, load_encoder) for fact in card.autoencoders)
     return judge_set(Trained(nets, encoders, card), origin)
 
 
@@ -223,7 +223,13 @@ def read_card(folder: Path) -> JudgeCard:
         raise JudgeRefused(f"judge card cannot be read: {str(error).splitlines()[0]}", where=str(path)) from error
 
 
-def _loaded(path: Path, digest: str, load: Callable[[Path], tuple[Model, str]]) -> Model:
+def load_checked(path: Path, digest: str, load: Callable[[Path], tuple[Model, str]]) -> Model:
+    """The network of a judge file whose digest must be the one that the card names.
+
+    Raises
+    ------
+    JudgeRefused : missing, damaged, or another judge.
+    """
     try:
         model, found = load(path)
     except BadCheckpoint as error:

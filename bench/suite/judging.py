@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -59,11 +60,16 @@ def embed(judges: JudgeSet, motions: Motions) -> Embedding:
 
 def stored_embedding(judges: JudgeSet, motions: Motions, store: Store) -> Embedding:
     """:func:`embed`, asked once for the same motions and judges."""
-    key = embed_key(motions.digest, judges.digest)
+    return stored_answers(judges.digest, lambda: embed(judges, motions), motions, store)
+
+
+def stored_answers(judges_digest: str, ask: Callable[[], Embedding], motions: Motions, store: Store) -> Embedding:
+    """What some judges say about a set of motions, asked once."""
+    key = embed_key(motions.digest, judges_digest)
     if not store.has("embed", key):
 
         def write(folder: Path) -> dict[str, int]:
-            embed(judges, motions).save(folder)
+            ask().save(folder)
             return {"n": motions.n}
 
         store.put("embed", key, write)

@@ -2,7 +2,7 @@
 
 ``python -m bench.suite.make_judges NAME [--data PATH]`` replaces the dataset's folder under ``classifiers/pretrained``;
 ``--again CONDITION`` trains one judge once more, for example on another processor, and notes on the card by how much
-the result differs.
+the result differs; ``--second`` trains the second family alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,17 @@ from bench.datasets.take import Take
 from bench.errors import JudgeRefused
 from bench.suite.judge_card import to_markdown
 from bench.suite.judge_training import measure_split, train_again
-from bench.suite.judges import CANONICAL_RECIPE, PRETRAINED, SEEDS, JudgeSet, load_canonical, save_judges, train_judges
+from bench.suite.judges import (
+    CANONICAL_RECIPE,
+    PRETRAINED,
+    SEEDS,
+    JudgeSet,
+    load_canonical,
+    read_card,
+    save_judges,
+    train_judges,
+)
+from bench.suite.second_judges import SecondJudges, save_second_judges, train_second_judges
 
 _log = logging.getLogger(__name__)
 
@@ -42,7 +52,20 @@ def make_canonical(dataset: Dataset, unseen: Sequence[Take] = (), progress: Prog
     )
     judges = replace(judges, card=judges.card.model_copy(update={"other_splits": others}))
     save_judges(PRETRAINED / dataset.dataset_id, judges)
+    add_second(dataset, unseen, progress)
     return judges
+
+
+def add_second(dataset: Dataset, unseen: Sequence[Take] = (), progress: ProgressCallback | None = None) -> SecondJudges:
+    """Train the second family beside a dataset's canonical judges and store it with them.
+
+    Raises
+    ------
+    JudgeRefused : one is below its gate, or there are no canonical judges; nothing is stored.
+    """
+    second = train_second_judges(dataset, deal(dataset.takes), unseen=unseen, progress=progress)
+    save_second_judges(PRETRAINED / dataset.dataset_id, second)
+    return second
 
 
 def repeat_canonical(dataset: Dataset, condition: str) -> JudgeSet:
@@ -74,16 +97,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.suite.make_judges", description=main.__doc__)
     parser.add_argument("name", help="dataset, as in `stylebench list datasets`")
     parser.add_argument("--again", metavar="CONDITION", help="only train one judge again and note the difference")
+    parser.add_argument("--second", action="store_true", help="only train the second family")
     parser.add_argument("--data", type=Path, help="where the dataset lies; generated data needs none")
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     dataset = load_dataset(arguments.name, arguments.data)
+    unseen = procedural.unseen_takes() if dataset.name == "procedural" else ()
     if arguments.again:
-        judges = repeat_canonical(dataset, arguments.again)
+        repeat_canonical(dataset, arguments.again)
+    elif arguments.second:
+        add_second(dataset, unseen, progress=_log_fifths)
     else:
-        unseen = procedural.unseen_takes() if dataset.name == "procedural" else ()
-        judges = make_canonical(dataset, unseen, progress=_log_fifths)
-    _log.info("stored in %s\n%s", PRETRAINED / judges.card.dataset_id, to_markdown(judges.card))
+        make_canonical(dataset, unseen, progress=_log_fifths)
+    folder = PRETRAINED / dataset.dataset_id
+    _log.info("stored in %s\n%s", folder, to_markdown(read_card(folder)))
 
 
 def _log_fifths(what: str, done: int, total: int) -> None:

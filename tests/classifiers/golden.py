@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bench.motion.edit import windows
 from bench.motion.representation import judge_features
 from bench.suite.judges import PRETRAINED, JudgeSet, load_judges
+from bench.suite.second_judges import SecondJudges, load_second_judges
 
 FOLDER = Path(__file__).parent / "golden"
 WINDOWS_FILE = FOLDER / "windows.npz"
@@ -28,6 +29,17 @@ def answers(judges: JudgeSet, features: NDArray[np.floating]) -> dict[str, NDArr
         "components": np.stack([encoded.components for encoded in out.encoded]),
     }
     return {name: array.astype(np.float32) for name, array in stacked.items()}
+
+
+def second_answers(judges: SecondJudges, features: NDArray[np.floating]) -> dict[str, NDArray[np.float32]]:
+    """The same of the second family, which has no auto-encoder."""
+    out = judges.evaluate(features)
+    return {
+        "content": out.content_features,
+        "style": out.style_features,
+        "content_log_probabilities": out.content_log_probabilities,
+        "style_log_probabilities": out.style_log_probabilities,
+    }
 
 
 def write_windows() -> None:
@@ -51,6 +63,9 @@ def main() -> None:
         judges = load_judges(folder)
         arrays = {"digest": np.array(judges.digest), **answers(judges, features)}
         np.savez(FOLDER / f"{folder.name}.npz", **arrays)  # type: ignore[arg-type]
+        second = load_second_judges(folder)
+        arrays = {"digest": np.array(second.digest), **second_answers(second, features)}
+        np.savez(FOLDER / f"{folder.name}.second.npz", **arrays)  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":

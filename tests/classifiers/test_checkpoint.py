@@ -15,10 +15,12 @@ from classifiers.checkpoint import (
     checkpoint_of,
     load_classifier,
     load_encoder,
+    load_temporal,
     read_checkpoint,
     write_checkpoint,
 )
 from classifiers.stgcn import Stgcn
+from classifiers.temporal import Temporal, TemporalConfig
 
 from .conftest import SMALL
 
@@ -49,6 +51,19 @@ def test_encoder_round_trip(tmp_path: Path) -> None:
     digest = write_checkpoint(path, checkpoint_of(encoder, "autoencoder/0"))
     again, found = load_encoder(path)
     assert found == digest and again.config == encoder.config
+
+
+def test_second_family_round_trip(tmp_path: Path, stored: Path) -> None:
+    original = Temporal(TemporalConfig(5, 2, n_frames=16, widths=(4, 4), strides=(2, 1))).eval()
+    path = tmp_path / "temporal.safetensors"
+    digest = write_checkpoint(path, checkpoint_of(original, "temporal-style/0"))
+    again, found = load_temporal(path)
+    windows = torch.randn(3, 16, 5, 3)
+    assert found == digest and torch.equal(again(windows), original(windows))
+    with pytest.raises(BadCheckpoint, match="expected a judge of kind temporal, got stgcn"):
+        load_temporal(stored)
+    with pytest.raises(BadCheckpoint, match="expected a judge of kind stgcn, got temporal"):
+        load_classifier(path)
 
 
 def test_one_changed_byte_is_noticed(stored: Path) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from bench.suite.judges import PRETRAINED, load_judges
+from bench.suite.second_judges import load_second_judges
 
-from .golden import FOLDER, WINDOWS_FILE, answers
+from .golden import FOLDER, WINDOWS_FILE, answers, second_answers
 
 CANONICAL = sorted(path.parent for path in PRETRAINED.glob("*/card.json"))
 
@@ -26,6 +27,37 @@ def test_features_of_stored_windows(folder: Path) -> None:
         for name, array in found.items():
             scale = np.abs(golden[name]).max()
             assert np.abs(array - golden[name]).max() <= 1e-4 * scale, name
+
+
+@pytest.mark.parametrize("folder", CANONICAL, ids=lambda folder: folder.name)
+def test_second_family_says_what_it_said(folder: Path) -> None:
+    judges = load_second_judges(folder)
+    with np.load(WINDOWS_FILE, allow_pickle=False) as stored:
+        found, again = (second_answers(judges, stored["features"]) for _ in range(2))
+    with np.load(FOLDER / f"{folder.name}.second.npz", allow_pickle=False) as golden:
+        assert str(golden["digest"]) == judges.digest, "trained anew: run python -m tests.classifiers.golden"
+        for name, array in found.items():
+            assert np.array_equal(array, again[name]), name
+            assert np.abs(array - golden[name]).max() <= 1e-4 * np.abs(golden[name]).max(), name
+
+
+PUBLISHED_JUDGES = {
+    "procedural@1": "fade5730f2ae4c2b961be6a65421c10c",
+    "bandai-namco@1": "7e8a2304b04b2c37681a12ea4e0a3142",
+}
+"""Published records refer to these."""
+
+
+@pytest.mark.parametrize("folder", CANONICAL, ids=lambda folder: folder.name)
+def test_second_family_is_an_addition(folder: Path) -> None:
+    judges, second = load_judges(folder, "canonical"), load_second_judges(folder)
+    assert judges.digest == PUBLISHED_JUDGES[folder.name]
+    assert [fact.id for fact in second.facts] == [
+        f"temporal-{t}/{seed}" for t in ("content", "style") for seed in range(3)
+    ]
+    assert not {fact.id for fact in second.facts} & {fact.id for fact in judges.facts}
+    assert all((folder / fact.file).stat().st_size < 300_000 for fact in second.facts)
+    assert all(fact.pooled.accuracy >= 95.0 for fact in second.facts)
 
 
 @pytest.mark.parametrize("folder", CANONICAL, ids=lambda folder: folder.name)

@@ -13,7 +13,8 @@ from classifiers.autoencoder import AutoencoderConfig
 from classifiers.checkpoint import checkpoint_of
 from classifiers.data import BadArray
 from classifiers.embed import classify, encode, reconstruction_angle_deg
-from classifiers.train import TrainingConfig, stretch_time, train_autoencoder, train_classifier
+from classifiers.temporal import TemporalConfig
+from classifiers.train import TrainingConfig, stretch_time, train_autoencoder, train_classifier, train_temporal
 
 from .conftest import SMALL, windows_of_two_classes
 
@@ -35,6 +36,19 @@ def test_same_seed_same_bytes_other_seed_others(two_classes: Sample) -> None:
         checkpoint_of(train_classifier(*two_classes, SMALL, short, seed=seed)[0], "x").digest for seed in (3, 3, 4)
     )
     assert first == again != other
+
+
+def test_second_family_learns_repeats_itself_and_reads_positions_only(two_classes: Sample) -> None:
+    windows, labels = two_classes
+    network = TemporalConfig(5, 2, n_frames=16, widths=(8, 8), strides=(2, 1))
+    models = [train_temporal(windows[..., :3], labels, network, QUICK, seed=seed)[0] for seed in (3, 3, 4)]
+    first, again, other = (checkpoint_of(model, "x").digest for model in models)
+    assert first == again != other
+    unseen, true = windows_of_two_classes(100, seed=1)
+    judged = classify(models[0], unseen[..., :3])
+    assert np.mean(judged.predicted == true) > 0.9 and judged.features.shape == (100, 8)
+    with pytest.raises(BadArray, match=r"\[n, 16, 5, 3\]"):
+        classify(models[0], unseen)
 
 
 def test_threads_and_global_generator_are_put_back(two_classes: Sample) -> None:

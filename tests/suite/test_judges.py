@@ -16,12 +16,15 @@ from bench.datasets.take import Take
 from bench.errors import BadInput, JudgeRefused
 from bench.motion import quat
 from bench.motion.clip import Clip
+from bench.motion.edit import crop
 from bench.motion.skeleton import LEFT_ARM, RIGHT_ARM, SPINE, Skeleton, canonical_skeleton
 from bench.suite import judges as judges_module
 from bench.suite.judge_card import check_gate, recognition, to_markdown, within_session
 from bench.suite.judge_training import JudgeRecipe, measure_split, train_again
 from bench.suite.judges import JudgeSet, load_canonical, load_judges, read_card, save_judges, train_judges
 from bench.suite.motions import Motions
+from bench.suite.second_judges import load_second_judges, save_second_judges, train_second_judges
+from bench.suite.store import Store
 from classifiers.train import TrainingConfig
 
 QUICK = JudgeRecipe(
@@ -201,6 +204,37 @@ def test_other_splits_and_training_again(judges: JudgeSet, dataset: Dataset, spl
     text = to_markdown(card)
     assert "| interleaved | content | 0 |" in text and "| same machine | yes | 100.00 % |" in text
     assert "CC0" in text and "| true \\ predicted | left | right |" in text
+
+
+def test_second_family_lies_beside_the_first_and_leaves_its_digest_alone(
+    judges: JudgeSet, dataset: Dataset, split: Split, features: NDArray[np.float64], tmp_path: Path
+) -> None:
+    folder = tmp_path / "judges"
+    save_judges(folder, judges)
+    with pytest.raises(JudgeRefused, match="there is no second judge family"):
+        load_second_judges(folder)
+    second = train_second_judges(dataset, split, seeds=(0, 1), recipe=QUICK, unseen=dataset.takes[:4])
+    save_second_judges(folder, second)
+    found, first = load_second_judges(folder), load_judges(folder)
+    assert first.digest == judges.digest and first.card.second == second.facts == found.facts
+    assert [fact.id for fact in found.facts] == [f"temporal-{t}/{s}" for t in ("content", "style") for s in (0, 1)]
+    assert "## Second family" in (folder / "card.md").read_text()
+    said = found.evaluate(features)
+    assert said.content_features.shape == (2, len(features), 64) and said.autoencoder_components.shape[2] == 0
+    assert np.array_equal(said.style_log_probabilities, second.evaluate(features).style_log_probabilities)
+    motions, store = Motions.of([dataset.takes[0].with_clip(crop(dataset.takes[0].clip, 0, 64))]), Store(tmp_path / "s")
+    once, again = (found.stored_embedding(motions, store) for _ in range(2))
+    assert np.array_equal(once.content_features, again.content_features)
+    assert len(list((tmp_path / "s" / "embed").iterdir())) == 1
+    (folder / "temporal-style-1.safetensors").write_bytes((folder / "temporal-style-0.safetensors").read_bytes())
+    with pytest.raises(JudgeRefused, match="its card names"):
+        load_second_judges(folder)
+
+
+def test_a_poor_second_family_is_refused(dataset: Dataset, split: Split) -> None:
+    untrained = JudgeRecipe(TrainingConfig(n_steps=1, batch_size=8))
+    with pytest.raises(JudgeRefused, match=r"too few real windows right to score anything: temporal-"):
+        train_second_judges(dataset, split, seeds=(0,), recipe=untrained)
 
 
 def test_recognition_counts() -> None:
