@@ -72,7 +72,9 @@ def run(
         str, typer.Option(help="Address of a Dask scheduler, or the file it wrote; runs cells on its workers.")
     ] = "",
     keep_failures: Annotated[bool, typer.Option(help="Do not try cells again that failed before.")] = False,
-    seed: Annotated[int, typer.Option(help="Method seed.")] = 0,
+    seeds: Annotated[
+        str, typer.Option("--seeds", "--seed", help="Comma-separated; methods that fit run once with each.")
+    ] = "0",
     budget: Annotated[str, typer.Option(help="Training budget of methods that fit.")] = "small",
     split: Annotated[str, typer.Option(help="default, contiguous or interleaved.")] = "default",
     against: Annotated[str, typer.Option(help="Rows to stand beside: leaderboard, or a run folder.")] = "",
@@ -101,7 +103,7 @@ def run(
         jobs=jobs,
         scheduler=scheduler,
         keep_failures=keep_failures,
-        seed=seed,
+        seeds=_seeds(seeds),
         budget=budget,
         split=split,
         retrain_judges=retrain_judges,
@@ -318,6 +320,15 @@ def clean(
 
 def _names(option: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in option.split(",") if name.strip())
+
+
+def _seeds(option: str) -> tuple[int, ...]:
+    names = _names(option)
+    if not all(name.isdecimal() for name in names):
+        raise BadConfig(
+            f"expected numbers from 0 on, got {option!r}", where="--seeds", remedy="for example --seeds 0,1,2"
+        )
+    return tuple(int(name) for name in names)
 
 
 def _data(option: str) -> Data:

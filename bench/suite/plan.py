@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from bench.adapters.base import Adapter
 from bench.adapters.loading import AdapterSource, find_adapter
 from bench.adapters.oracles import Oracle
+from bench.adapters.post_processed import plain
 from bench.suite.keys import adapter_digest, fit_key, generate_key
 from bench.suite.setting import Setting
 from bench.suite.store import Store
+from bench.suite.truth import KNOWN_FOR
 from bench.suite.workers import Outcome
 from reports.records import MethodFacts, digest_of
 
@@ -38,15 +40,18 @@ class Cell:
 
 
 def plan_cells(
-    setting: Setting, sources: Sequence[AdapterSource], *, seed: int, budget: str, device: str
+    setting: Setting, sources: Sequence[AdapterSource], *, seeds: Sequence[int], budget: str, device: str
 ) -> list[Cell]:
-    """The cells of a run, in the order of ``sources``."""
-    return [
-        _broken(source, seed, budget)
-        if source.broken
-        else _cell(setting, source, find_adapter(source), seed, budget, device)
-        for source in sources
-    ]
+    """The cells of a run, in the order of ``sources``: of a method that is trained one a seed, else the first alone."""
+    cells = []
+    for source in sources:
+        if source.broken:
+            cells.append(_broken(source, seeds[0], budget))
+            continue
+        adapter = find_adapter(source)
+        own_seeds = seeds if adapter.kind == "method" and adapter.fits() else seeds[:1]
+        cells += [_cell(setting, source, adapter, seed, budget, device) for seed in own_seeds]
+    return cells
 
 
 def _broken(source: AdapterSource, seed: int, budget: str) -> Cell:
@@ -58,24 +63,27 @@ def _broken(source: AdapterSource, seed: int, budget: str) -> Cell:
 
 def _cell(setting: Setting, source: AdapterSource, adapter: type[Adapter], seed: int, budget: str, device: str) -> Cell:
     digest = adapter_digest(adapter)
-    fitted = fit_key(digest, setting.fit_digest, budget, seed, device) if adapter.fits() else ""
+    trained = adapter_digest(plain(adapter))
+    fitted = fit_key(trained, setting.fit_digest, budget, seed, device) if adapter.fits() else ""
     return Cell(
         source=source,
-        facts=_facts(source, adapter, digest, budget, seed),
+        facts=_facts(source, adapter, digest, budget),
         seed=seed,
         budget=budget,
         fit_key=fitted,
-        motions_key=generate_key(fitted or digest, setting.tasks_digest, seed),
+        motions_key=generate_key(
+            fitted or digest, setting.tasks_digest, seed, after=digest if trained != digest else ""
+        ),
         given=not issubclass(adapter, Oracle),
         settled=Outcome("unsupported", reason) if (reason := _unsupported(adapter, setting)) else None,
     )
 
 
-def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: str, seed: int) -> MethodFacts:
+def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: str) -> MethodFacts:
     traits = adapter.traits
     trained = traits.trained_on
     if adapter.fits() and adapter.kind == "method":
-        trained = f"fit part, budget {budget}, seed {seed}"
+        trained = f"fit part, budget {budget}"
     return MethodFacts(
         name=adapter.name or source.name,
         title=adapter.title or adapter.name or source.name,
@@ -93,12 +101,11 @@ def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: s
 def _unsupported(adapter: type[Adapter], setting: Setting) -> str:
     protocol = setting.protocol
     if issubclass(adapter, Oracle):
-        if adapter.needs_truth and setting.dataset.name != "procedural":
-            return "true answers exist for the procedural dataset only"
-        wanted = protocol.track
-        if protocol.condition in ("self", "long", "short", "foreign", "parts"):
-            wanted = f"{protocol.track}/{protocol.condition}"
-        if wanted not in adapter.tracks:
+        if adapter.needs_truth and setting.dataset.name != KNOWN_FOR:
+            return f"true answers exist for the {KNOWN_FOR} dataset only"
+        # Conditions of our own protocols ask for something else than the track; those of papers are tables of theirs.
+        special = protocol.name == f"stylebench-{protocol.track}" and protocol.condition != "standard"
+        if (f"{protocol.track}/{protocol.condition}" if special else protocol.track) not in adapter.tracks:
             return f"means nothing in {protocol.label}"
     elif protocol.needs not in adapter.capabilities():
         return f"{protocol.label} needs an adapter that {protocol.needs}"

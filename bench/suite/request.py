@@ -11,6 +11,7 @@ from pathlib import Path
 
 from bench.adapters import ADAPTERS
 from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
+from bench.adapters.post_processed import split_suffix
 from bench.adapters.probe import import_failure
 from bench.errors import BadConfig
 from bench.protocols import PROTOCOLS
@@ -42,6 +43,7 @@ class RunRequest:
     out, store : run folder and store folder.
     scheduler : address of a Dask scheduler, or the file that it wrote; empty for ``jobs`` processes of this machine.
     keep_failures : cells that failed in an earlier run with this store keep that outcome and are not tried again.
+    seeds : methods that are trained run once with each; all other rows run once, with the first.
     command : as typed, for the records.
     """
 
@@ -57,7 +59,7 @@ class RunRequest:
     jobs: int = 2
     scheduler: str = ""
     keep_failures: bool = False
-    seed: int = 0
+    seeds: tuple[int, ...] = (0,)
     budget: str = "small"
     split: str = "default"
     retrain_judges: bool = False
@@ -86,10 +88,11 @@ def sources_of(request: RunRequest) -> list[AdapterSource]:
 
 
 def _source_of_file(option: str, out: Path) -> AdapterSource:
-    path, _, class_name = option.partition(":")
+    plain, _ = split_suffix(option)
+    path, _, class_name = plain.partition(":")
     if not Path(path).expanduser().is_file():
         return source_from_option(option)
-    failure = import_failure(option)
+    failure = import_failure(plain)
     if failure is None:
         return source_from_option(option)
     name = class_name or Path(path).stem
@@ -115,11 +118,30 @@ def protocols_of(request: RunRequest) -> list[Protocol]:
             _known(name, PROTOCOLS, "protocol")
     found = [protocol for label, protocol in PROTOCOLS.items() if label in chosen]
     for protocol in found:
-        if request.profile not in protocol.n_samples:
-            raise BadConfig(
-                f"unknown profile {request.profile!r}", remedy=f"choose from {', '.join(protocol.n_samples)}"
-            )
+        check_profile(protocol, request.profile)
     return found
+
+
+def protocol_called(label: str) -> Protocol:
+    """One protocol by its label.
+
+    Raises
+    ------
+    BadConfig : there is none.
+    """
+    _known(label, PROTOCOLS, "protocol")
+    return PROTOCOLS[label]
+
+
+def check_profile(protocol: Protocol, profile: str) -> None:
+    """Refuse a profile that a protocol does not have.
+
+    Raises
+    ------
+    BadConfig : naming those it has.
+    """
+    if profile not in protocol.n_samples:
+        raise BadConfig(f"unknown profile {profile!r}", remedy=f"choose from {', '.join(protocol.n_samples)}")
 
 
 def _known(name: str, table: Mapping[str, Protocol], what: str) -> bool:
@@ -133,9 +155,12 @@ def check_request(request: RunRequest) -> None:
 
     Raises
     ------
-    BadConfig : unknown protocols, or folders that cannot be written.
+    BadConfig : unknown protocols, seeds that are none, or folders that cannot be written.
     """
     protocols_of(request)
+    seeds = request.seeds
+    if not seeds or len(set(seeds)) < len(seeds) or min(seeds) < 0:
+        raise BadConfig(f"expected different numbers from 0 on, got {seeds}", where="--seeds")
     for option, folder in (("--out", request.out), ("--store", request.store)):
         _check_writable(folder, option)
 

@@ -121,7 +121,7 @@ def _settings(request: RunRequest, datasets: Sequence[Dataset], store: Store) ->
 
 
 def _cells(request: RunRequest, setting: Setting, sources: Sequence[AdapterSource]) -> list[Cell]:
-    cells = plan_cells(setting, sources, seed=request.seed, budget=request.budget, device="cpu")
+    cells = plan_cells(setting, sources, seeds=request.seeds, budget=request.budget, device="cpu")
     return [cell for cell in cells if _is_a_row(cell, request)]
 
 

@@ -11,11 +11,10 @@ from bench.adapters.loading import AdapterSource
 from bench.adapters.motion_files import read_bounded
 from bench.datasets.table import load_dataset
 from bench.errors import BadConfig, BadFile
-from bench.protocols import PROTOCOLS
 from bench.suite.keys import generate_key
 from bench.suite.motions import Motions
 from bench.suite.plan import Cell
-from bench.suite.request import RunRequest, check_request
+from bench.suite.request import RunRequest, check_profile, check_request, protocol_called
 from bench.suite.run import fresh_records_folder
 from bench.suite.session import Progress, session_of
 from bench.suite.setting import Setting, prepare
@@ -43,11 +42,8 @@ def setting_of(data: Data, label: str, profile: str, store: Path, progress: Prog
     ------
     BadConfig : no such protocol or profile.
     """
-    if label not in PROTOCOLS:
-        raise BadConfig(f"unknown protocol {label!r}", remedy="'stylebench list protocols' shows them")
-    protocol = PROTOCOLS[label]
-    if profile not in protocol.n_samples:
-        raise BadConfig(f"unknown profile {profile!r}", remedy=f"choose from {', '.join(protocol.n_samples)}")
+    protocol = protocol_called(label)
+    check_profile(protocol, profile)
     dataset = load_dataset(data.name, data.path, lambda what, done, total: progress("data", what, done, total))
     return prepare(dataset, protocol, profile, Store(store))
 

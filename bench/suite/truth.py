@@ -17,6 +17,7 @@ from reports.records import digest_of
 
 TRUTH_VERSION = 1
 KNOWN_FOR = "procedural"
+"""The dataset whose true answers are known."""
 
 
 def truth_key(setting: Setting) -> str:

@@ -29,6 +29,8 @@ def request(folder: Path, **changes: object) -> RunRequest:
         ({"data": {"bandai-namco": Path("/nonexistent")}}, BadData, "no such file or folder"),
         ({"data": {"procedural": Path("/tmp")}}, BadConfig, "takes no path"),
         ({"adapter_files": ("/nope.py",)}, BadConfig, "no Python file"),
+        ({"seeds": (0, 0)}, BadConfig, "expected different numbers from 0 on"),
+        ({"seeds": ()}, BadConfig, "expected different numbers from 0 on"),
         ({"out": Path("/dev/null/out")}, BadConfig, "cannot be written"),
         ({"store": Path("/dev/null/store")}, BadConfig, "cannot be written"),
     ],
