@@ -16,7 +16,7 @@ class Metric:
     ----------
     name : as in records and tables.
     version : raised whenever the definition changes; numbers of two versions never share a column.
-    unit : ``%``, ``1`` for ratios and correlations, ``distance`` for Frechet and kernel distances, else an SI unit.
+    unit : ``%``, ``1`` for ratios and correlations, ``distance`` for distances of features, else an SI unit.
     better : the good direction; ``one`` is best at 1, ``none`` has no direction.
     summary : one line.
     source : paper and place, or this benchmark.
@@ -45,6 +45,11 @@ HANDS = "Kuriyama 2022, section 4.2, eq. 13-16"
 ERD_TIME = "Style-ERD 2022, section 4.3, Table 2"
 MASON = "Mason 2022, section 4.3, eq. 5"
 MASON_TIME = "Mason 2022, Table 2"
+GMD = "GMD: Karunratanakul 2023, foot skating ratio, thresholds of the released code"
+NAEEM = "Naeem 2020, density and coverage, k = 5"
+GUO = "Guo 2020 (Action2Motion), all pairs instead of random ones"
+STURM = "Sturm 2012, absolute trajectory error"
+MEEHAN = "this benchmark, after Meehan 2020"
 
 TRANSFER_METRICS: tuple[Metric, ...] = (
     Metric("joint_recognition", 1, "%", "higher", "content and style both judged right on the same sample", OURS,
@@ -86,6 +91,44 @@ TRANSFER_METRICS: tuple[Metric, ...] = (
            "real motion of the right labels is near 0: a source-fidelity number, not a quality", "physics"),
     Metric("bone_drift", 1, "%", "lower", "departure of bone lengths from the source's", OURS,
            "0 by construction for outputs given as rotations", "physics"),
+)  # fmt: skip
+
+PHYSICS_METRICS: tuple[Metric, ...] = (
+    Metric("foot_skate", 1, "cm/s", "lower", "horizontal speed of the foot that stands, on an estimated floor", OURS,
+           "a foot dragged past a standing one is no skating; a frozen frame has none", "physics"),
+    Metric("skate[gmd]", 1, "%", "lower", "frames in which a toe under 5 cm moves faster than 0.5 m/s", GMD,
+           "feet that swing low count: real walking has 30 %; a raised floor hides any sliding", "physics"),
+    Metric("penetration", 1, "cm", "lower", "depth of the lowest foot under the floor, mean over frames", OURS,
+           "0 for a motion that hovers", "physics"),
+    Metric("float_height", 1, "cm", "lower", "height of the lowest foot over the floor, mean over frames", OURS,
+           "runs and jumps float: compare with real motion of the content", "physics"),
+    Metric("speed_ratio", 1, "1", "one", "mean joint speed over that of real motion of the same contents", OURS,
+           "styles differ in speed", "physics"),
+    Metric("joint_range", 1, "%", "lower", "joint angles outside the range that the fit part has", OURS,
+           "a right angle at a wrong time or beside a wrong one is within; the mean pose is perfect", "physics"),
+    Metric("contact_precision", 1, "%", "higher", "planted frames of the output in which the source's foot stands too",
+           OURS, "a copy of the source is perfect; styles have a timing of their own", "physics"),
+    Metric("contact_recall", 1, "%", "higher", "planted frames of the source in which the output's foot stands too",
+           OURS, "feet that never leave the floor are perfect", "physics"),
+    Metric("root_path_error", 1, "cm", "lower", "distance of the root's way over the floor from the source's, aligned",
+           STURM, "a copy of the source is perfect; a style may take longer steps", "physics"),
+)  # fmt: skip
+
+DIVERSITY_METRICS: tuple[Metric, ...] = (
+    Metric("density[stgcn-content]", 1, "1", "one", "real balls that hold an output, over k, content features", NAEEM,
+           "above 1 where outputs crowd where real motion is dense: mean poses can", "diversity"),
+    Metric("density[stgcn-style]", 1, "1", "one", "real balls that hold an output, over k, style features", NAEEM,
+           "above 1 where outputs crowd where real motion is dense", "diversity"),
+    Metric("coverage[stgcn-content]", 1, "%", "higher", "real windows whose ball holds an output, content features",
+           NAEEM, "grows with n: compare with its floor; copies of the source cover well", "diversity"),
+    Metric("coverage[stgcn-style]", 1, "%", "higher", "real windows whose ball holds an output, style features", NAEEM,
+           "grows with n: compare with its floor; copies cover well", "diversity"),
+    Metric("diversity", 1, "distance", "none", "distance between two outputs in content features", GUO,
+           "noise is diverse too: compare with that of real motion", "diversity"),
+    Metric("multimodality", 1, "distance", "none", "distance between two outputs for one content in content features",
+           GUO, "sources differ, so a copy of the source is as diverse as real motion", "diversity"),
+    Metric("neighbour_ratio", 1, "1", "one", "median nearest distance to the fit part over that to the test part",
+           MEEHAN, "source and style reference are left out: copying those shows in copied share only", "memorisation"),
 )  # fmt: skip
 
 PAPER_METRICS: tuple[Metric, ...] = (
@@ -217,6 +260,8 @@ RUNTIME_METRICS: tuple[Metric, ...] = (
 
 ALL_METRICS = (
     *TRANSFER_METRICS,
+    *PHYSICS_METRICS,
+    *DIVERSITY_METRICS,
     *PAPER_METRICS,
     *CONDITION_METRICS,
     *PARTS_METRICS,

@@ -85,7 +85,7 @@ def sources_of(tasks: Sequence[Task]) -> Motions:
 
 def reference() -> Reference:
     """Test takes as sources, other takes as fit; 120 real windows."""
-    test, fit = toy_takes(0), toy_takes(500)
+    test, fit = toy_takes(0), [replace(take, take_id=f"fit_{take.take_id}") for take in toy_takes(500)]
     tasks = make_tasks(TaskPool(test), N_TASKS, 0)
     rng = np.random.default_rng(5)
     contents, styles = rng.integers(0, 2, 120), rng.integers(0, 3, 120)
@@ -109,7 +109,8 @@ def reference() -> Reference:
         floor_jerk=np.full(N_TASKS, 50.0),
         floors=FLOORS,
         counts=cluster_counts(np.array([task.content_take_id for task in tasks]), 50, seed=0),
-        pack=pack_of(test),
+        pack=pack_of([*test, *fit]),
+        fit_take_ids=tuple(take.take_id for take in fit),
         truth=sources_of(tasks),
         activations={},
     )
