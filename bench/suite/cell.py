@@ -11,7 +11,6 @@ import os
 import resource
 import shutil
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Callable
@@ -22,14 +21,14 @@ from typing import Any
 from bench.adapters.base import Adapter
 from bench.adapters.loading import AdapterSource, find_adapter
 from bench.adapters.oracles import World
-from bench.adapters.session import OutOfTime
 from bench.datasets.pack import Pack
 from bench.datasets.take import Take
-from bench.errors import BadMotion, BadOutput, BenchError
 from bench.suite.answering import answering
+from bench.suite.child import leave_if_forked, leave_with_parent, reason_of, status_of
 from bench.suite.motions import Motions
 from bench.suite.setting import read_tasks
 from bench.suite.store import Store
+from bench.suite.truth import KNOWN_FOR
 
 Send = Callable[[dict[str, Any]], None]
 
@@ -80,7 +79,7 @@ class Job:
 
 def main(arguments: list[str]) -> int:
     """Run a job; every outcome is a message, the exit code only says whether the worker itself lived."""
-    threading.Thread(target=leave_with_parent, args=(os.getppid(),), daemon=True).start()
+    leave_with_parent(os.getppid())
     own = os.getpid()
     line = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
@@ -106,19 +105,6 @@ def main(arguments: list[str]) -> int:
         else:
             send({"event": "ok", "cell": cell.key})
     return 0
-
-
-def leave_if_forked(own: int) -> None:
-    """End a process that a method forked and that came back here: it must neither go on nor report for its parent."""
-    if os.getpid() != own:
-        os._exit(1)
-
-
-def leave_with_parent(parent: int) -> None:
-    """End this process soon after the one that started it is gone, also in the middle of a long fit."""
-    while os.getppid() == parent:
-        time.sleep(1.0)
-    os._exit(1)
 
 
 def _ready_adapter(job: Job, send: Send) -> tuple[Adapter, Pack]:
@@ -182,7 +168,7 @@ def _generate(job: Job, cell: GenerateJob, adapter: Adapter, pack: Pack, send: S
 
 def _world(job: Job, pack: Pack) -> World:
     fit, disjoint = ([pack.take(take_id) for take_id in ids] for ids in (job.fit_take_ids, job.disjoint_take_ids))
-    if job.dataset != "procedural":
+    if job.dataset != KNOWN_FOR:
         return World(fit, disjoint, pack.by_id)
     from bench.datasets.procedural import imitated, true_answer
 
@@ -191,13 +177,7 @@ def _world(job: Job, pack: Pack) -> World:
 
 def _failure(key: str, error: Exception) -> dict[str, Any]:
     traceback.print_exc()
-    status = "invalid" if isinstance(error, BadOutput | BadMotion) else "failed"
-    if isinstance(error, MemoryError):
-        status = "oom"
-    if isinstance(error, OutOfTime):
-        status = "timeout"
-    text = str(error) if isinstance(error, BenchError) else f"{type(error).__name__}: {error}"
-    return {"event": "failed", "cell": key, "status": status, "reason": " ".join(text.split())}
+    return {"event": "failed", "cell": key, "status": status_of(error), "reason": reason_of(error)}
 
 
 if __name__ == "__main__":

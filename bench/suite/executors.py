@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import queue
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -24,7 +23,7 @@ from typing import Any, TypeVar
 
 from bench.errors import BadConfig, BenchError
 from bench.suite.calls import MOST_ATTEMPTS, Call, run_call
-from bench.suite.cell import leave_with_parent
+from bench.suite.child import leave_with_parent
 from bench.suite.machines import Wanted, problems_here
 
 POLL_S = 0.5
@@ -143,7 +142,7 @@ def _one_process() -> ProcessPoolExecutor:
 
 def _watch_parent(parent: int) -> None:
     """A pool's process waits for work for ever, also when nobody lives to send any."""
-    threading.Thread(target=leave_with_parent, args=(parent,), daemon=True).start()
+    leave_with_parent(parent)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from bench.adapters.anchors import Noise, NoiseLow, PoseAdain
 from bench.adapters.base import Adapter, Description, Stream, Traits
 from bench.adapters.loading import AdapterSource
 from bench.adapters.oracles import RealTest
+from bench.adapters.session import OutOfTime
 from bench.arrays import FloatArray
 from bench.datasets.take import Take
 from bench.errors import BadConfig, BadOutput
@@ -311,6 +312,7 @@ def test_rows_that_look_up_answers_and_rows_without_calls_are_unsupported(tmp_pa
         (BadOutput("two\nlines"), "invalid", "two lines"),
         (ValueError("clip 317"), "failed", "ValueError: clip 317"),
         (MemoryError(), "oom", "MemoryError:"),
+        (OutOfTime("no answer within 5 s"), "timeout", "no answer within 5 s"),
         (Unsupported("no"), "unsupported", "no"),
     ],
 )

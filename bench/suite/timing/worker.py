@@ -12,8 +12,6 @@ import os
 import resource
 import statistics
 import sys
-import threading
-import time
 import traceback
 from pathlib import Path
 from typing import Any
@@ -24,7 +22,9 @@ from bench.adapters.base import Adapter, Description
 from bench.adapters.external import External
 from bench.adapters.loading import find_adapter
 from bench.adapters.oracles import Oracle
-from bench.errors import BadConfig, BadMotion, BadOutput, BenchError
+from bench.adapters.post_processed import plain_instance
+from bench.errors import BadConfig, BadOutput, BenchError
+from bench.suite.child import leave_if_forked, leave_with_parent, reason_of, status_of
 from bench.suite.store import Store
 from bench.suite.timing.calls import Calls, timed_inputs
 from bench.suite.timing.look_ahead import LookAhead, measured_look_ahead
@@ -39,13 +39,15 @@ class Unsupported(BenchError):
 def main(arguments: list[str]) -> int:
     """Answer requests until the parent closes the pipe; a failure is the last answer."""
     job, plan, threads = read_job(Path(arguments[0]))
-    threading.Thread(target=_leave_with_parent, args=(os.getppid(),), daemon=True).start()
+    leave_with_parent(os.getppid())
+    own = os.getpid()
     # What the method prints goes to the log, and what it reads is empty: the line is not its own.
     requests, answers = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
 
     def send(message: dict[str, Any]) -> None:
+        leave_if_forked(own)
         answers.write(json.dumps(message) + "\n")
 
     send({"memory_mb": memory_mb("VmRSS")})
@@ -75,8 +77,9 @@ def loaded_adapter(job: TimingJob) -> Adapter:
     adapter = adapter_class()
     if job.fit_key:
         adapter.load(Store(Path(job.store)).folder("fit", job.fit_key))
-    if isinstance(adapter, External):
-        adapter.session()
+    program = plain_instance(adapter)
+    if isinstance(program, External):
+        program.session()
     return adapter
 
 
@@ -174,7 +177,7 @@ class TimingWorker:
             raise BadOutput(f"expected a Description, got {type(described).__name__}", where="describe()")
         declared = described.designed_input_frames if described else None
         return {
-            "outside_program": isinstance(self.adapter, External),
+            "outside_program": isinstance(plain_instance(self.adapter), External),
             "parameters": described.parameters if described else None,
             "bytes_per_style": described.bytes_per_style if described else None,
             "designed_input_frames": traits.designed_input_frames if declared is None else declared,
@@ -202,13 +205,8 @@ class TimingWorker:
 
 def failure(error: Exception) -> dict[str, Any]:
     """The last message of a worker: a status and one line."""
-    status = "invalid" if isinstance(error, BadOutput | BadMotion) else "failed"
-    if isinstance(error, Unsupported):
-        status = "unsupported"
-    if isinstance(error, MemoryError):
-        status = "oom"
-    text = str(error) if isinstance(error, BenchError) else f"{type(error).__name__}: {error}"
-    return {"failed": status, "reason": " ".join(text.split())}
+    status = "unsupported" if isinstance(error, Unsupported) else status_of(error)
+    return {"failed": status, "reason": reason_of(error)}
 
 
 def memory_mb(field: str) -> float:
@@ -221,13 +219,6 @@ def memory_mb(field: str) -> float:
         return next(int(line.split()[1]) for line in lines if line.startswith(f"{field}:")) / 1024
     except (OSError, StopIteration):
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-def _leave_with_parent(parent: int) -> None:
-    """End this process soon after the one that started it is gone, also in the middle of a long call."""
-    while os.getppid() == parent:
-        time.sleep(1.0)
-    os._exit(1)
 
 
 if __name__ == "__main__":
