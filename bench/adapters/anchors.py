@@ -59,13 +59,13 @@ class CopyContent(Anchor):
         return content.clip
 
     def open_stream(self, style: Take, *, content_label: str | None, rng: np.random.Generator) -> Stream:
-        return _Identity()
+        return IdentityStream()
 
     def describe(self) -> Description:
         return Description(parameters=0, bytes_per_style=0, designed_input_frames=1, look_ahead_frames=0)
 
 
-class _Identity:
+class IdentityStream:
     """The stream that answers every pose with itself."""
 
     def step(self, rotations_wxyz: FloatArray, root_xyz_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -28,10 +28,13 @@ class CheckRow:
     remedy: str = ""
 
 
-def check_answer(answer: object, source: Clip, *, n_frames: int | None = None) -> list[CheckRow]:
+def check_answer(
+    answer: object, source: Clip, *, n_frames: int | None = None, own_bones: bool = False
+) -> list[CheckRow]:
     """All properties of one answer, in the order in which they should be read; stops where nothing more can be said.
 
-    ``n_frames`` is the expected length, the source's by default.
+    ``n_frames`` is the expected length, the source's by default. With ``own_bones`` the answer shows a body of its own:
+    what only holds for one body, bones, units and the root's path, is not compared with the source.
     """
     if not isinstance(answer, Clip):
         got = f"{type(answer).__module__}.{type(answer).__qualname__}"
@@ -58,19 +61,23 @@ def check_answer(answer: object, source: Clip, *, n_frames: int | None = None) -
         ),
         _skeleton_row(answer, source),
     ]
+    if own_bones:
+        return rows
     if rows[-1].ok:
         rows.append(_bones_row(answer, source))
     return [*rows, _units_row(answer, source), _teleport_row(answer, source)]
 
 
-def checked_answer(answer: object, source: Clip, where: str, *, n_frames: int | None = None) -> Clip:
-    """An answer that may be scored.
+def checked_answer(
+    answer: object, source: Clip, where: str, *, n_frames: int | None = None, own_bones: bool = False
+) -> Clip:
+    """An answer that may be scored, by :func:`check_answer`.
 
     Raises
     ------
     BadOutput : the first property that does not hold; ``where`` names the sample.
     """
-    for row in check_answer(answer, source, n_frames=n_frames):
+    for row in check_answer(answer, source, n_frames=n_frames, own_bones=own_bones):
         if row.ok is False:
             problem = f"{row.name}: expected {row.expected}, got {row.got}"
             raise BadOutput(problem, where=where, cause=row.cause, remedy=row.remedy)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from bench.datasets.joined import BLEND_S
 from bench.motion.clip import Clip
 from bench.motion.edit import crop, join, pad_to, resample, window_starts
 
 WINDOW_FPS = 30.0
-BLEND_S = 0.3
 
 
 def in_windows(content: Clip, n_frames: int, answer: Callable[[Clip], Clip]) -> Clip:
-    """Answer consecutive windows of ``n_frames`` at 30 fps and join the answers, blended over 0.3 s.
+    """Answer consecutive windows of ``n_frames`` at 30 fps and join the answers, blended over ``BLEND_S``.
 
     The result has the content's frames and fps; the last window is padded where the content ends within it.
     """

@@ -12,18 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from bench.datasets.base import Dataset
+from bench.datasets.joined import joined_take, piece_ids
 from bench.datasets.take import Take
 from bench.errors import BadData
-from bench.motion.edit import crop, join
-from bench.motion.pose import onto_skeleton
+from bench.motion.edit import crop
 from bench.protocols.base import Task, TaskPool, pick
 from bench.protocols.transfer import TRANSFER, WINDOW_FRAMES, draw_tasks, make_tasks
 
-LONG_FRAMES = (1000, 3600)
-LONG_EVERY = 5
-"""Every fifth long sequence has 3600 frames, the others 1000."""
+LONG_FRAMES = (1000, 1000, 1000, 1000, 3600)
+"""Frames of long sequences, in turn."""
 N_LONG = 50
-BLEND_S = 0.3
 PREFIX_FRAMES = (10, 16, 32, 64)
 
 
@@ -69,16 +67,14 @@ def long_sequences(parts: Mapping[str, Sequence[Take]], foreign: Dataset | None,
 
 
 def _sequence(number: int, style: str, by_style: Mapping[str, list[Take]], rng: np.random.Generator) -> Take:
-    n_frames = LONG_FRAMES[number % LONG_EVERY == LONG_EVERY - 1]
+    n_frames = LONG_FRAMES[number % len(LONG_FRAMES)]
     pieces = [pick(by_style[style], rng)]
     while sum(piece.clip.n_frames for piece in pieces) < n_frames:
         others = [take for take in by_style[style] if take.content != pieces[-1].content]
         pieces.append(pick(others or by_style[style], rng))
-    skeleton = pieces[0].clip.skeleton
-    clip = crop(join([onto_skeleton(piece.clip, skeleton) for piece in pieces], BLEND_S), 0, n_frames)
-    # The ids of the pieces are in the id, so that a task can name what is judged where.
-    take_id = f"long-{number:02d}:{'+'.join(piece.take_id for piece in pieces)}"
-    return Take(clip, take_id, pieces[0].dataset, content="joined", style=style)
+    first = pieces[0].clip
+    sequence = joined_take(f"long-{number:02d}", pieces, first.skeleton, first.fps, content="joined")
+    return sequence.with_clip(crop(sequence.clip, 0, n_frames))
 
 
 def long_tasks(pool: TaskPool, n: int, seed: int) -> list[Task]:
@@ -89,7 +85,7 @@ def long_tasks(pool: TaskPool, n: int, seed: int) -> list[Task]:
     for index, sequence in enumerate(pool.extra[:n]):
         references = [take for take in pool.takes if take.style != sequence.style]
         reference = pick(references, rng)
-        pieces = [by_id[take_id] for take_id in sequence.take_id.partition(":")[2].split("+")]
+        pieces = [by_id[take_id] for take_id in piece_ids(sequence.take_id)]
         starts = np.cumsum([0, *(piece.clip.n_frames for piece in pieces[:-1])])
         tasks.append(
             Task(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,7 +14,6 @@ from bench.adapters.oracles import Oracle, World
 from bench.adapters.piecewise import in_windows
 from bench.datasets.pack import Pack
 from bench.datasets.take import Take
-from bench.errors import BadOutput
 from bench.motion.clip import Clip
 from bench.motion.edit import crop, resample, window
 from bench.protocols.base import Task
@@ -41,22 +41,41 @@ class _OracleAnswers:
         content = source_of(task, self.pack, self.fps)
         style = self.pack.take(task.style_take_id)
         take = self.oracle.answer(content, task.start_frame, style, self.world, rng=np.random.default_rng(task.seed))
-        same_length = task.n_frames > 0
-        return take.with_clip(checked(take.clip, content.clip, task.sample_id, own_bones=True, same_length=same_length))
+        n_frames = task.n_frames or take.clip.n_frames
+        clip = checked_answer(take.clip, content.clip, task.sample_id, n_frames=n_frames, own_bones=True)
+        return take.with_clip(clip)
+
+
+def content_for(adapter: Adapter, take: Take) -> Take:
+    """A content take with the labels that the adapter asked for, and no other."""
+    traits = adapter.traits
+    return take.hidden(content=traits.needs_content_label, style=traits.needs_source_style_label)
+
+
+def style_for(adapter: Adapter, take: Take) -> Take:
+    """A style reference with the label that the adapter asked for, and no other."""
+    return take.hidden(content=False, style=adapter.traits.needs_style_label)
 
 
 @dataclass(frozen=True)
-class _Answers:
+class _Asked:
     """An adapter with the labels it declared to need, and nothing else."""
 
     adapter: Adapter
     fps: float
     pack: Pack
 
+    def _style(self, take_id: str) -> Take:
+        return style_for(self.adapter, self.pack.take(take_id))
+
+
+class _FromContent(_Asked, ABC):
+    """One content in, the same frames out."""
+
     def __call__(self, task: Task) -> Take:
         content = source_of(task, self.pack, self.fps)
-        clip = self._answer(task, self._hidden_content(content))
-        return Take(checked(clip, content.clip, task.sample_id), content=task.content, style=task.target_style)
+        clip = self._answer(task, content_for(self.adapter, content))
+        return Take(checked_answer(clip, content.clip, task.sample_id), content=task.content, style=task.target_style)
 
     def _answer(self, task: Task, content: Take) -> Clip:
         traits = self.adapter.traits
@@ -65,56 +84,51 @@ class _Answers:
             return self._call(task, content)
         return in_windows(content.clip, n_frames, lambda clip: self._call(task, content.with_clip(clip)))
 
+    @abstractmethod
     def _call(self, task: Task, content: Take) -> Clip:
-        raise NotImplementedError
-
-    def _hidden_content(self, take: Take) -> Take:
-        traits = self.adapter.traits
-        return take.hidden(content=traits.needs_content_label, style=traits.needs_source_style_label)
-
-    def _hidden_style(self, take_id: str) -> Take:
-        return self.pack.take(take_id).hidden(content=False, style=self.adapter.traits.needs_style_label)
+        """The adapter's answer for a content of a length that it takes."""
 
 
-class _Transfer(_Answers):
+class _Transfer(_FromContent):
     def _call(self, task: Task, content: Take) -> Clip:
-        return self.adapter.transfer(content, self._hidden_style(task.style_take_id), rng=_rng(task))
+        return self.adapter.transfer(content, self._style(task.style_take_id), rng=_rng(task))
 
 
-class _Sample(_Answers):
+class _Sample(_FromContent):
     def _call(self, task: Task, content: Take) -> Clip:
         return self.adapter.sample(content, task.target_style, rng=_rng(task))
 
 
-class _Parts(_Answers):
+class _Parts(_FromContent):
     def _call(self, task: Task, content: Take) -> Clip:
-        styles = {task.part: self._hidden_style(task.style_take_id)}
+        styles = {task.part: self._style(task.style_take_id)}
         return self.adapter.transfer_parts(content, styles, rng=_rng(task))
 
 
-class _Interpolate(_Answers):
+class _Interpolate(_FromContent):
     def _call(self, task: Task, content: Take) -> Clip:
         named = task.source_style if self.adapter.traits.needs_style_label else None
-        start = self._hidden_style(task.start_take_id) if task.start_take_id else Take(content.clip, style=named)
-        styles = [(start, 1.0 - task.weight), (self._hidden_style(task.style_take_id), task.weight)]
+        start = self._style(task.start_take_id) if task.start_take_id else Take(content.clip, style=named)
+        styles = [(start, 1.0 - task.weight), (self._style(task.style_take_id), task.weight)]
         if task.part:
             return self.adapter.interpolate_parts(content, task.part, styles, rng=_rng(task))
         return self.adapter.interpolate(content, styles, rng=_rng(task))
 
 
-class _Predict(_Answers):
+class _Predict(_Asked):
     """Single frames from the true past; the answer's bones are its own."""
 
     def __call__(self, task: Task) -> Take:
         take = self.pack.take(task.content_take_id)
         past = crop(take.clip, task.start_frame - PAST_FRAMES, PAST_FRAMES)
         path = take.clip.root_xyz_m[task.start_frame : task.start_frame + PAST_FRAMES, [0, 2]]
-        clip = self.adapter.predict(past, self._hidden_style(task.style_take_id), path)
+        clip = self.adapter.predict(past, self._style(task.style_take_id), path)
         frame = crop(take.clip, task.start_frame, 1)
-        return Take(checked(clip, frame, task.sample_id, own_bones=True), content=task.content, style=task.target_style)
+        answer = checked_answer(clip, frame, task.sample_id, own_bones=True)
+        return Take(answer, content=task.content, style=task.target_style)
 
 
-ANSWERS: dict[str, type[_Answers]] = {
+ANSWERS: dict[str, Callable[[Adapter, float, Pack], Answer]] = {
     "transfer": _Transfer,
     "latent": _Sample,
     "parts": _Parts,
@@ -135,25 +149,3 @@ def source_of(task: Task, pack: Pack, fps: float) -> Take:
 
 def _rng(task: Task) -> np.random.Generator:
     return np.random.default_rng(task.seed)
-
-
-def checked(clip: object, source: Clip, sample_id: str, *, own_bones: bool = False, same_length: bool = True) -> Clip:
-    """An answer that may be scored: a Clip with the source's frames, fps and bones, in metres, without jumps.
-
-    Answers with bones of their own come from rows that show other people, and from predictions.
-
-    Raises
-    ------
-    BadOutput : naming the sample, what was expected and what came.
-    """
-    if not own_bones:
-        return checked_answer(clip, source, sample_id)
-    if not isinstance(clip, Clip):
-        raise BadOutput(f"expected a Clip, got {type(clip).__name__}", where=sample_id)
-    if same_length and clip.n_frames != source.n_frames:
-        raise BadOutput(f"expected {source.n_frames} frames, got {clip.n_frames}", where=sample_id)
-    if abs(clip.fps - source.fps) > 1e-6:
-        raise BadOutput(f"expected {source.fps:g} fps, got {clip.fps:g}", where=sample_id)
-    if not clip.skeleton.is_canonical:
-        raise BadOutput("expected the canonical 21 joints", where=sample_id)
-    return clip

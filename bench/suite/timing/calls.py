@@ -5,7 +5,6 @@ What is timed is the adapter's call from end to end: everything between motion i
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,21 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from bench.adapters.base import Adapter, Stream
+from bench.adapters.anchors import CopyContent, IdentityStream
+from bench.adapters.answers import checked_answer
+from bench.adapters.base import Adapter
 from bench.adapters.piecewise import pad_end
-from bench.arrays import FloatArray
+from bench.datasets.joined import BLEND_S
 from bench.datasets.pack import Pack
 from bench.datasets.take import Take
 from bench.errors import BadOutput
 from bench.motion.clip import Clip
 from bench.motion.edit import crop, join, resample, windows
-from bench.protocols.base import Task
-from bench.suite.answering import checked
+from bench.suite.answering import content_for, style_for
+from bench.suite.setting import read_tasks
 from bench.suite.timing.plan import ONLINE, TimingJob, TimingPlan
 from bench.suite.timing.stopwatch import Stopwatch
-
-BLEND_S = 0.3
-"""Blend at the joins of an input that is longer than its take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,18 +44,12 @@ class TimedInput:
 def timed_inputs(job: TimingJob, plan: TimingPlan, adapter: Adapter) -> tuple[TimedInput, ...]:
     """The first sources and styles of the task list, the same for every adapter but for the labels it may see."""
     pack = Pack.open(Path(job.pack))
-    tasks = [Task.from_dict(row) for row in json.loads(Path(job.tasks_file).read_text())[: plan.n_inputs]]
-    traits = adapter.traits
     found = []
-    for task in tasks:
+    for task in read_tasks(Path(job.tasks_file))[: plan.n_inputs]:
         content, style = pack.take(task.content_take_id), pack.take(task.style_take_id)
         source = content.with_clip(repeated(resample(content.clip, plan.fps), plan.input_frames))
-        found.append(
-            TimedInput(
-                source.hidden(content=traits.needs_content_label, style=traits.needs_source_style_label),
-                style.with_clip(resample(style.clip, plan.fps)).hidden(content=False, style=traits.needs_style_label),
-            )
-        )
+        reference = style.with_clip(resample(style.clip, plan.fps))
+        found.append(TimedInput(content_for(adapter, source), style_for(adapter, reference)))
     return tuple(found)
 
 
@@ -132,7 +124,7 @@ class Calls:
 
         def transfer(clip: Clip) -> Clip:
             output = self.adapter.transfer(content.with_clip(clip), source.style, rng=self._rng())
-            return checked(output, clip, "a call on changed motion")
+            return checked_answer(output, clip, "a call on changed motion")
 
         return transfer, content.clip
 
@@ -148,9 +140,9 @@ class Calls:
         def check(outputs: Sequence[Any]) -> None:
             for (pieces, _), answers in zip(arguments, outputs, strict=True):
                 for (content, _), answer in zip(pieces, answers, strict=True):
-                    checked(answer, content.clip, f"a call on {content.clip.n_frames} frames")
+                    checked_answer(answer, content.clip, f"a call on {content.clip.n_frames} frames")
 
-        return Block(_answers_of(self.adapter), _answers_of(Nothing()), arguments, check)
+        return Block(_answers_of(self.adapter), _answers_of(CopyContent()), arguments, check)
 
     def _pieces(self, content: Take) -> list[tuple[Take, np.random.Generator]]:
         """What is to be answered: the content, or windows of it for a method that knows one length only."""
@@ -169,9 +161,9 @@ class Calls:
         before = [stream.step(*frame) for frame in frames[:past]]
 
         def check(outputs: Sequence[Any]) -> None:
-            checked(_clip_of([*before, *outputs], content.clip), content.clip, "a stream")
+            checked_answer(_clip_of([*before, *outputs], content.clip), content.clip, "a stream")
 
-        return Block(stream.step, NothingStream().step, frames[past:], check, opening_ns)
+        return Block(stream.step, IdentityStream().step, frames[past:], check, opening_ns)
 
 
 def _answers_of(adapter: Adapter) -> Callable[[Sequence[tuple[Take, np.random.Generator]], Take], list[Clip]]:
@@ -184,17 +176,3 @@ def _clip_of(frames: Sequence[Any], like: Clip) -> Clip:
         return like.with_motion(np.stack(rotations), np.stack(roots))
     except (TypeError, ValueError) as error:
         raise BadOutput(f"expected rotations [J, 4] and root [3] for each frame: {error}", where="a stream") from error
-
-
-class Nothing(Adapter):
-    """Answers at once: what a call costs the harness itself."""
-
-    def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
-        return content.clip
-
-
-class NothingStream(Stream):
-    """Answers every frame with itself, at once."""
-
-    def step(self, rotations_wxyz: FloatArray, root_xyz_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return rotations_wxyz, root_xyz_m
