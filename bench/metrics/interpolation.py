@@ -99,19 +99,23 @@ def evenness(positions_m: ArrayLike) -> float:
     return float(steps.max()) / mean if mean > 0.0 else float("nan")
 
 
-def end_recognition_percent(
+def ends_right(
     predicted_contents: ArrayLike,
     predicted_styles: ArrayLike,
     contents: ArrayLike,
     start_styles: ArrayLike,
     target_styles: ArrayLike,
-) -> float:
-    """Share of the 2N outputs at both ends whose content and style are both judged right, in percent.
+) -> FloatArray:
+    """Share of the two outputs at the ends whose content and style are both judged right, for every sample.
 
     Parameters
     ----------
     predicted_contents, predicted_styles : ``[N, W]`` predicted labels.
     contents, start_styles, target_styles : ``[N]`` the labels wanted; start at the first weight, target at the last.
+
+    Returns
+    -------
+    ``[N]`` 0, 0.5 or 1.
 
     Raises
     ------
@@ -129,23 +133,49 @@ def end_recognition_percent(
     ends = (0, -1)
     right_content = seen_contents[:, ends] == wanted_contents[:, None]
     right_style = seen_styles[:, ends] == np.stack([starts, targets], axis=1)
-    return 100.0 * float((right_content & right_style).mean())
+    return np.asarray((right_content & right_style).mean(axis=1))
 
 
-def middle_content_percent(predicted_contents: ArrayLike, contents: ArrayLike) -> float:
-    """Share of the outputs strictly between the ends whose content is judged right, in percent.
+def end_recognition_percent(
+    predicted_contents: ArrayLike,
+    predicted_styles: ArrayLike,
+    contents: ArrayLike,
+    start_styles: ArrayLike,
+    target_styles: ArrayLike,
+) -> float:
+    """Share of the 2N outputs at both ends whose content and style are both judged right, in percent.
+
+    Parameters and errors as in :func:`ends_right`.
+    """
+    return 100.0 * float(ends_right(predicted_contents, predicted_styles, contents, start_styles, target_styles).mean())
+
+
+def middle_right(predicted_contents: ArrayLike, contents: ArrayLike) -> FloatArray:
+    """Share of the outputs strictly between the ends whose content is judged right, for every sample.
 
     Parameters
     ----------
     predicted_contents : ``[N, W]`` predicted labels, W at least 3.
     contents : ``[N]`` labels wanted.
 
+    Returns
+    -------
+    ``[N]`` in 0..1.
+
     Raises
     ------
     BadInput : not integer labels, wrong shape, no sample, lengths that differ, fewer than 3 weights.
     """
     seen, wanted = _labels(predicted_contents, contents, "predicted_contents", "contents", 3)
-    return 100.0 * float((seen[:, 1:-1] == wanted[:, None]).mean())
+    return np.asarray((seen[:, 1:-1] == wanted[:, None]).mean(axis=1))
+
+
+def middle_content_percent(predicted_contents: ArrayLike, contents: ArrayLike) -> float:
+    """Share of the outputs strictly between the ends whose content is judged right, in percent.
+
+    Parameters and errors as in :func:`middle_right`.
+    """
+    return 100.0 * float(middle_right(predicted_contents, contents).mean())
 
 
 def _centred_ranks(values: FloatArray) -> FloatArray:

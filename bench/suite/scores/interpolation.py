@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.arrays import FloatArray, IntArray
+from bench.arrays import IntArray
 from bench.metrics import interpolation
 from bench.metrics.interpolation import WEIGHTS
 from bench.protocols.base import Task
 from bench.suite.scores.base import Reference, Row, Scored, mean_score, share_score
 
 N_WEIGHTS = len(WEIGHTS)
+Number = TypeVar("Number", bound=np.generic)
 
 
 def groups_of(tasks: Sequence[Task]) -> list[Task]:
@@ -23,7 +25,7 @@ def groups_of(tasks: Sequence[Task]) -> list[Task]:
 
 def monotonicity(row: Row, reference: Reference) -> Scored:
     """Spearman of weight against target-minus-start log odds, mean over judge seeds."""
-    targets, starts = row.styles[N_WEIGHTS - 1 :: N_WEIGHTS], _start_styles(row, reference)
+    targets, starts = _of_groups(row.styles), _start_styles(row, reference)
     by_judge = []
     for log_probabilities in row.embedding.style_log_probabilities:
         grouped = _grouped(log_probabilities.astype(np.float64))
@@ -47,17 +49,22 @@ def evenness(row: Row, reference: Reference) -> Scored:
 
 def end_recognition(row: Row, reference: Reference) -> Scored:
     """Content and style judged right at both ends: a group counts 0, one half, or 1."""
-    starts, targets = _start_styles(row, reference), row.styles[N_WEIGHTS - 1 :: N_WEIGHTS]
-    right_content = _grouped_judges(row.content_correct)
-    seen = _grouped_judges(row.embedding.style_predicted)
-    ends = (right_content[:, :, 0] & (seen[:, :, 0] == starts), right_content[:, :, -1] & (seen[:, :, -1] == targets))
-    return share_score("end_recognition", np.mean(ends, axis=0), reference, slices=_slices(reference))
+    contents, targets = _of_groups(row.contents), _of_groups(row.styles)
+    starts = _start_styles(row, reference)
+    right = [
+        interpolation.ends_right(_grouped(seen_contents), _grouped(seen_styles), contents, starts, targets)
+        for seen_contents, seen_styles in zip(
+            row.embedding.content_predicted, row.embedding.style_predicted, strict=True
+        )
+    ]
+    return share_score("end_recognition", np.stack(right), reference, slices=_slices(reference))
 
 
 def middle_content(row: Row, reference: Reference) -> Scored:
     """Content judged right strictly between the ends."""
-    middle = _grouped_judges(row.content_correct)[:, :, 1:-1].mean(axis=-1)
-    return share_score("middle_content", middle, reference, slices=_slices(reference))
+    contents = _of_groups(row.contents)
+    right = [interpolation.middle_right(_grouped(seen), contents) for seen in row.embedding.content_predicted]
+    return share_score("middle_content", np.stack(right), reference, slices=_slices(reference))
 
 
 def _slices(reference: Reference) -> tuple[str, ...]:
@@ -73,11 +80,11 @@ def _start_styles(row: Row, reference: Reference) -> IntArray:
     )
 
 
-def _grouped(values: FloatArray) -> FloatArray:
+def _grouped(values: NDArray[Number]) -> NDArray[Number]:
     """``[G * W, ...]`` to ``[G, W, ...]``."""
     return values.reshape(-1, N_WEIGHTS, *values.shape[1:])
 
 
-def _grouped_judges(values: NDArray[np.generic]) -> NDArray[np.generic]:
-    """``[S, G * W]`` to ``[S, G, W]``."""
-    return values.reshape(len(values), -1, N_WEIGHTS)
+def _of_groups(labels: IntArray) -> IntArray:
+    """``[G * W]`` wanted labels to ``[G]``, those of the last weight."""
+    return labels[N_WEIGHTS - 1 :: N_WEIGHTS]
