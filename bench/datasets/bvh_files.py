@@ -9,8 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.datasets.base import ProgressCallback
+from bench.datasets.base import Dataset, ProgressCallback
 from bench.datasets.cache import Made, cached_takes
+from bench.datasets.reading import Overrides, Reading, facts_of
 from bench.datasets.take import Take
 from bench.errors import BadData, BadFile, BenchError
 from bench.motion.bvh import BvhMotion, read_bvh
@@ -42,6 +43,18 @@ class LabelledFile:
     @property
     def take_id(self) -> str:
         return self.place[: -len(".bvh")]
+
+
+def given_folder(path: Path | None, dataset: str, how_to_get: str) -> Path:
+    """The folder of a dataset that everybody gets for themselves.
+
+    Raises
+    ------
+    BadData : no path is given; says how to get the dataset.
+    """
+    if path is None:
+        raise BadData("it is read from your copy, and no path is given", where=dataset, remedy=how_to_get)
+    return path
 
 
 def bvh_places(folder: Path) -> list[str]:
@@ -104,6 +117,40 @@ def read_takes(
     digest = state.hexdigest()
     takes, _ = cached_takes(f"{dataset}-{digest}", lambda: _made(folder, files, to_clip, dataset, piece_s, progress))
     return takes, digest
+
+
+def local_dataset(
+    folder: Path,
+    files: Sequence[LabelledFile],
+    reading: Reading,
+    overrides: Overrides,
+    *,
+    name: str,
+    licence: str,
+    citation: str,
+    notes: Sequence[str],
+    piece_s: float | None = None,
+    progress: ProgressCallback | None = None,
+) -> Dataset:
+    """The dataset of labelled files of somebody's copy, each content judged under its own name.
+
+    Raises
+    ------
+    BadFile : files cannot be read.
+    """
+    facts = facts_of(reading, overrides)
+    takes, digest = read_takes(folder, files, reading.to_clip, facts, dataset=name, piece_s=piece_s, progress=progress)
+    return Dataset(
+        name=name,
+        dataset_id=f"{name}-local",
+        digest=digest,
+        takes=takes,
+        judged_content={content: content for content in sorted({file.content for file in files})},
+        licence=licence,
+        citation=citation,
+        source=folder.name,
+        notes=tuple(notes),
+    )
 
 
 def _made(

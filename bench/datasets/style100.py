@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Archive, Dataset, DatasetEntry, ProgressCallback
-from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_takes
-from bench.datasets.reading import Overrides, facts_of, known_reading
+from bench.datasets.bvh_files import LabelledFile, bvh_places, given_folder, local_dataset, neutral_as_elsewhere
+from bench.datasets.reading import Overrides, known_reading
 from bench.errors import BadData
 from bench.motion.known_skeletons import XSENS
 
@@ -105,10 +105,9 @@ def load(path: Path | None, progress: ProgressCallback | None = None, overrides:
     BadData : no path, no file of the dataset, no frame cuts, or a full set whose totals are not the published ones.
     BadFile : files that cannot be read.
     """
-    if path is None:
-        raise BadData("it is read from your copy, and no path is given", where=NAME, remedy=HOW_TO_GET)
-    places = bvh_places(path)
-    cuts = read_cuts(find_cuts(path))
+    folder = given_folder(path, NAME, HOW_TO_GET)
+    places = bvh_places(folder)
+    cuts = read_cuts(find_cuts(folder))
     files: list[LabelledFile] = []
     for place in places:
         found = _FILE.fullmatch(PurePosixPath(place).stem)
@@ -117,25 +116,22 @@ def load(path: Path | None, progress: ProgressCallback | None = None, overrides:
             style = neutral_as_elsewhere(found["style"])
             files.append(LabelledFile(place, GAITS[found["gait"]], style, frames=frames))
     if not files:
-        raise BadData(f"no file is called like Angry_FW.bvh; the first is {places[0]}", where=str(path))
+        raise BadData(f"no file is called like Angry_FW.bvh; the first is {places[0]}", where=str(folder))
     full = len(files) >= PUBLISHED_FILES
     wrong = check_totals(cuts) if full else []
     if wrong:
-        raise BadData("; ".join(wrong), where=str(path), cause="not the frame cuts as published", remedy=HOW_TO_GET)
+        raise BadData("; ".join(wrong), where=str(folder), cause="not the frame cuts as published", remedy=HOW_TO_GET)
     overrides = overrides or Overrides()
     reading = known_reading(XSENS, UNIT, overrides)
-    facts = facts_of(reading, overrides)
-    takes, digest = read_takes(path, files, reading.to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
     left = len(places) - len(files)
-    return Dataset(
+    return local_dataset(
+        folder,
+        files,
+        reading,
+        overrides,
         name=NAME,
-        dataset_id=f"{NAME}-local",
-        digest=digest,
-        takes=takes,
-        judged_content={content: content for content in sorted({file.content for file in files})},
         licence=LICENCE,
         citation=CITATION,
-        source=path.name,
         notes=(
             "frame totals agree with the published ones" if full else f"{len(files)} of {PUBLISHED_FILES} recordings",
             *reading.notes,
@@ -143,6 +139,8 @@ def load(path: Path | None, progress: ProgressCallback | None = None, overrides:
             "fingers are virtual",
             *[f"{left} BVH files are not in {CUTS_CSV} and left out"] * bool(left),
         ),
+        piece_s=PIECE_S,
+        progress=progress,
     )
 
 

@@ -15,8 +15,8 @@ from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Dataset, DatasetEntry, ProgressCallback
-from bench.datasets.bvh_files import LabelledFile, bvh_places, read_takes
-from bench.datasets.reading import Overrides, facts_of, known_reading
+from bench.datasets.bvh_files import LabelledFile, bvh_places, given_folder, local_dataset
+from bench.datasets.reading import Overrides, known_reading
 from bench.errors import BadData
 from bench.motion.skeleton_maps import CMU_31
 
@@ -134,9 +134,8 @@ def load(path: Path | None, progress: ProgressCallback | None = None, overrides:
     BadData : no path, or no file of the dataset.
     BadFile : files that cannot be read.
     """
-    if path is None:
-        raise BadData("it is read from your copy, and no path is given", where=NAME, remedy=HOW_TO_GET)
-    places = bvh_places(path)
+    folder = given_folder(path, NAME, HOW_TO_GET)
+    places = bvh_places(folder)
     files: list[LabelledFile] = []
     for place in places:
         labels = labels_of(PurePosixPath(place).stem)
@@ -144,27 +143,25 @@ def load(path: Path | None, progress: ProgressCallback | None = None, overrides:
             files.append(LabelledFile(place, *labels))
     if not files:
         raise BadData(
-            f"no file is called like angry_13_000.bvh; the first is {places[0]}", where=str(path), remedy=HOW_TO_GET
+            f"no file is called like angry_13_000.bvh; the first is {places[0]}", where=str(folder), remedy=HOW_TO_GET
         )
     overrides = overrides or Overrides()
     reading = known_reading(CMU_31, "cmu", overrides, why="(5.6444 cm), as published")
-    facts = facts_of(reading, overrides)
-    takes, digest = read_takes(path, files, reading.to_clip, facts, dataset=NAME, progress=progress)
     left = len(places) - len(files)
-    return Dataset(
+    return local_dataset(
+        folder,
+        files,
+        reading,
+        overrides,
         name=NAME,
-        dataset_id=f"{NAME}-local",
-        digest=digest,
-        takes=takes,
-        judged_content={content: content for content in sorted({file.content for file in files})},
         licence=LICENCE,
         citation=CITATION,
-        source=path.name,
         notes=(
             f"{len(files)} files; the papers name {PUBLISHED_FILES}",
             *reading.notes,
             *[f"{left} files are mirrored copies or no files of the dataset, and left out"] * bool(left),
         ),
+        progress=progress,
     )
 
 

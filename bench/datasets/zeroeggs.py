@@ -11,8 +11,15 @@ import re
 from pathlib import Path, PurePosixPath
 
 from bench.datasets.base import Archive, Dataset, DatasetEntry, ProgressCallback
-from bench.datasets.bvh_files import LabelledFile, bvh_places, neutral_as_elsewhere, read_motion, read_takes
-from bench.datasets.reading import Overrides, facts_of, known_reading
+from bench.datasets.bvh_files import (
+    LabelledFile,
+    bvh_places,
+    given_folder,
+    local_dataset,
+    neutral_as_elsewhere,
+    read_motion,
+)
+from bench.datasets.reading import Overrides, known_reading
 from bench.errors import BadData
 from bench.motion.known_skeletons import ZEROEGGS
 from bench.motion.recognise import guess_unit
@@ -54,9 +61,8 @@ def load(path: Path | None, progress: ProgressCallback | None = None, overrides:
     BadFile : files that cannot be read.
     BadMotion : another skeleton.
     """
-    if path is None:
-        raise BadData("it is read from your copy, and no path is given", where=NAME, remedy=HOW_TO_GET)
-    places = bvh_places(path)
+    folder = given_folder(path, NAME, HOW_TO_GET)
+    places = bvh_places(folder)
     files: dict[str, LabelledFile] = {}
     for place in places:
         found = _FILE.fullmatch(PurePosixPath(place).stem)
@@ -65,39 +71,38 @@ def load(path: Path | None, progress: ProgressCallback | None = None, overrides:
         if found["number"] in files:
             raise BadData(
                 f"sequence {found['number']} is there twice: {files[found['number']].place} and {place}",
-                where=str(path),
+                where=str(folder),
                 cause="raw and cleaned files in one folder",
                 remedy="give the folder 'clean' or 'original'",
             )
         files[found["number"]] = LabelledFile(place, CONTENT, neutral_as_elsewhere(found["style"]))
     if not files:
         raise BadData(
-            f"no file is called like 001_Neutral_0.bvh; the first is {places[0]}", where=str(path), remedy=HOW_TO_GET
+            f"no file is called like 001_Neutral_0.bvh; the first is {places[0]}", where=str(folder), remedy=HOW_TO_GET
         )
     labelled = list(files.values())
     overrides = overrides or Overrides()
     unit = "m"
     if overrides.unit is None:
-        unit = guess_unit(rest_stature(read_motion(path / labelled[0].place, labelled[0].place), ZEROEGGS))
+        unit = guess_unit(rest_stature(read_motion(folder / labelled[0].place, labelled[0].place), ZEROEGGS))
     reading = known_reading(ZEROEGGS, unit, overrides, why="assumed from the stature")
-    facts = facts_of(reading, overrides)
-    takes, digest = read_takes(path, labelled, reading.to_clip, facts, dataset=NAME, piece_s=PIECE_S, progress=progress)
     left = len(places) - len(files)
-    return Dataset(
+    return local_dataset(
+        folder,
+        labelled,
+        reading,
+        overrides,
         name=NAME,
-        dataset_id=f"{NAME}-local",
-        digest=digest,
-        takes=takes,
-        judged_content={CONTENT: CONTENT},
         licence=LICENCE,
         citation=CITATION,
-        source=path.name,
         notes=(
             f"{len(files)} of {PUBLISHED_FILES} sequences",
             *reading.notes,
             f"sequences are cut into takes of {PIECE_S:g} s",
             *[f"{left} BVH files are mirrored or changed copies and left out"] * bool(left),
         ),
+        piece_s=PIECE_S,
+        progress=progress,
     )
 
 
