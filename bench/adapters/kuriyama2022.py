@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class SoftSwap(LearnedAdapter["KuriyamaConfig", "GestureTransfer"]):
     """Every content token becomes a blend of style tokens."""
 
-    name = "kuriyama2022"
-    title = "Kuriyama 2022"
+    name = "kuriyama-soft-swap"
+    title = "Kuriyama 2022 soft swap"
     description = "gesture tokens blended by a style transformer (soft swap)"
     traits = Traits(designed_input_frames=640)
     swap: ClassVar[str] = "soft"
@@ -51,8 +51,8 @@ class SoftSwap(LearnedAdapter["KuriyamaConfig", "GestureTransfer"]):
 class HardSwap(SoftSwap):
     """Every content token becomes the most similar style token."""
 
-    name = "kuriyama2022-hard-swap"
-    title = "Kuriyama 2022, hard swap"
+    name = "kuriyama-hard-swap"
+    title = "Kuriyama 2022 hard swap"
     description = "gesture tokens replaced by the style token of largest learned similarity (eq. 19)"
     swap = "hard"
 
@@ -60,8 +60,8 @@ class HardSwap(SoftSwap):
 class AvatarNet(SoftSwap):
     """Every content token becomes the nearest style token, statistics taken out before and put in after."""
 
-    name = "kuriyama2022-avatar-net"
-    title = "Kuriyama 2022, Avatar-net"
+    name = "kuriyama-avatar-net"
+    title = "Kuriyama 2022 Avatar-net"
     description = "whitened gesture tokens replaced by the style token of largest cosine (eq. 18)"
     swap = "avatar-net"
 
@@ -69,8 +69,8 @@ class AvatarNet(SoftSwap):
 class LatentAdain(SoftSwap):
     """Mean and deviation over time of the latents are the style's."""
 
-    name = "kuriyama2022-adain"
-    title = "Kuriyama 2022, latent AdaIN"
+    name = "kuriyama-adain"
+    title = "Kuriyama 2022 latent AdaIN"
     description = "latents of the gesture auto-encoder with the style's mean and deviation over time (eq. 17)"
     swap = "adain"
 
@@ -78,8 +78,8 @@ class LatentAdain(SoftSwap):
 class WithoutIdentity(SoftSwap):
     """Ablation of Table 4."""
 
-    name = "kuriyama2022-without-identity"
-    title = "Kuriyama 2022 w/o identity loss"
+    name = "kuriyama-soft-swap-no-identity"
+    title = "Kuriyama 2022 soft swap w/o identity loss"
     description = "soft swap trained without the identity loss"
     without = "identity"
 
@@ -87,8 +87,8 @@ class WithoutIdentity(SoftSwap):
 class WithoutCyclic(SoftSwap):
     """Ablation of Table 4."""
 
-    name = "kuriyama2022-without-cyclic"
-    title = "Kuriyama 2022 w/o cyclic loss"
+    name = "kuriyama-soft-swap-no-cyclic"
+    title = "Kuriyama 2022 soft swap w/o cyclic loss"
     description = "soft swap trained without the cyclic loss"
     without = "cyclic"
 
@@ -96,8 +96,8 @@ class WithoutCyclic(SoftSwap):
 class WithoutStructure(SoftSwap):
     """Ablation of Table 4."""
 
-    name = "kuriyama2022-without-structure"
-    title = "Kuriyama 2022 w/o structure loss"
+    name = "kuriyama-soft-swap-no-structure"
+    title = "Kuriyama 2022 soft swap w/o structure loss"
     description = "soft swap trained without the structure loss"
     without = "structure"
 
@@ -105,8 +105,8 @@ class WithoutStructure(SoftSwap):
 class WithoutAppearance(SoftSwap):
     """Ablation of Table 4."""
 
-    name = "kuriyama2022-without-appearance"
-    title = "Kuriyama 2022 w/o appearance loss"
+    name = "kuriyama-soft-swap-no-appearance"
+    title = "Kuriyama 2022 soft swap w/o appearance loss"
     description = "soft swap trained without the appearance loss"
     without = "appearance"
 

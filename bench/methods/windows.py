@@ -174,15 +174,26 @@ class _Groups:
         return self.order[places]
 
 
+def at_training_rate(clip: Clip, answer: Callable[[Clip], Clip]) -> Clip:
+    """The answer to a clip given at 30 fps, brought back to the clip's own fps and number of frames."""
+    if clip.fps == FPS:
+        return answer(clip)
+    back = resample(answer(resample(clip, FPS)), clip.fps)
+    frames = np.minimum(np.arange(clip.n_frames), back.n_frames - 1)
+    return back.with_motion(back.rotations_wxyz[frames], back.root_xyz_m[frames])
+
+
+def hold(clip: Clip, n_frames: int) -> Clip:
+    """The clip with its last pose held up to ``n_frames``; a longer one as it is."""
+    if clip.n_frames >= n_frames:
+        return clip
+    frames = np.minimum(np.arange(n_frames), clip.n_frames - 1)
+    return clip.with_motion(clip.rotations_wxyz[frames], clip.root_xyz_m[frames])
+
+
 def padded_frames(n_frames: int, multiple: int, least: int) -> int:
     """The smallest multiple of ``multiple`` that is at least ``n_frames`` and ``least``."""
     return -(-max(n_frames, least) // multiple) * multiple
-
-
-def pad_time(features: FloatArray, n_frames: int) -> FloatArray:
-    """``[T, ...]`` with its last frame held up to ``n_frames``."""
-    missing = n_frames - len(features)
-    return np.concatenate([features, np.repeat(features[-1:], missing, axis=0)]) if missing > 0 else features
 
 
 def to_tensor(features: FloatArray) -> Tensor:

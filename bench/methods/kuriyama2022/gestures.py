@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.arrays import FloatArray
+from bench.methods.windows import on_the_clock_of
 from bench.motion import quat
 from bench.motion.clip import Clip
 from bench.motion.edit import resample
@@ -71,8 +72,7 @@ def clip_of(upper: FloatArray, lower: FloatArray, content: Clip) -> Clip:
     root = root_on_planted_foot(
         rotations, timed.skeleton, timed.root_xyz_m[0, [0, 2]], floor_height(world_positions(timed))
     )
-    answer = resample(Clip(timed.skeleton, rotations, root, FPS), content.fps)
-    return content.with_motion(answer.rotations_wxyz, answer.root_xyz_m)
+    return on_the_clock_of(content, Clip(timed.skeleton, rotations, root, FPS))
 
 
 def root_on_planted_foot(
