@@ -104,7 +104,7 @@ def world_motion(bvh: BvhMotion) -> tuple[FloatArray, FloatArray]:
 
 def _parse(content: bytes) -> BvhMotion:
     content = content.removeprefix(b"\xef\xbb\xbf")
-    if b"\r" in content and b"\n" not in content:
+    if b"\n" not in content and b"\r" in content:
         content = content.replace(b"\r", b"\n")
     _check_start(content)
     marker = _MOTION_LINE.search(content)
@@ -167,11 +167,12 @@ def _parse_block(content: bytes, start: int, frames: int, columns: int) -> Float
     # A number and its separator take two bytes: whatever the header promises, no more memory is taken than that.
     values = np.empty(min(frames * columns, (len(content) - start + 1) // 2))
     text = np.frombuffer(content, dtype=np.uint8)
+    words = np.ndarray(max(len(content) - 7, 0), dtype="<u8", buffer=content, strides=(1,))
     odd = np.empty((256, 3), dtype=np.int64)
     position, index, on_line, status = start, 0, 0, _bvh_kernels.ODD_TOKENS_FULL
     while status == _bvh_kernels.ODD_TOKENS_FULL:
         status, position, index, on_line, n_odd = _bvh_kernels.parse_rows(
-            text, position, values, index, on_line, columns, odd
+            text, words, position, values, index, on_line, columns, odd
         )
         for token_start, token_end, at in odd[:n_odd].tolist():
             values[at] = _odd_number(content, token_start, token_end)

@@ -120,6 +120,30 @@ def test_any_decimal_is_bit_exact_to_float(token: str) -> None:
     assert read_bvh(one_column(token)).channel_values[0, 0].hex() == float(token).hex()
 
 
+PADDING = ["0.5"] * 10
+"""Puts a token far enough from the end of a file for eight characters to be read at a time."""
+
+
+@given(st.lists(st.from_regex(r"[+-]?[0-9]{1,9}\.[0-9]{0,9}", fullmatch=True), min_size=1, max_size=30))
+def test_decimals_inside_a_block_are_bit_exact_to_float(tokens: list[str]) -> None:
+    read = read_bvh(one_column(*tokens, *PADDING)).channel_values[: len(tokens), 0]
+    assert [value.hex() for value in read.tolist()] == [float(token).hex() for token in tokens]
+
+
+def test_any_byte_inside_a_number_is_read_as_float_does_or_refused() -> None:
+    read = 0
+    for byte in set(range(256)) - set(b"\t\n\v\f\r "):
+        for before, after in ((b"-1", b"2.5"), (b"12", b".5"), (b"12.", b"5"), (b"1.25", b"")):
+            content = one_column("TOKEN", *PADDING).replace(b"TOKEN", before + bytes([byte]) + after)
+            try:
+                value = read_bvh(content).channel_values[0, 0]
+            except BadFile:
+                continue
+            assert value.hex() == float((before + bytes([byte]) + after).decode()).hex()
+            read += 1
+    assert read > 10 * 4
+
+
 def test_more_odd_numbers_than_one_batch_holds() -> None:
     tokens = [f"{k}e-3" if k % 7 else str(k) for k in range(2000)]
     np.testing.assert_array_equal(
