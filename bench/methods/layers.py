@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -13,6 +13,8 @@ from torch.nn import functional
 from bench.errors import BadInput
 
 EPSILON = 1e-5
+
+Network = TypeVar("Network", bound=nn.Module)
 
 
 def statistics(x: Tensor, epsilon: float = EPSILON) -> tuple[Tensor, Tensor]:
@@ -120,7 +122,7 @@ def gradient_penalty(scores: Tensor, inputs: Tensor) -> Tensor:
     return gradient.square().flatten(1).sum(dim=1).mean()
 
 
-class Average:
+class Average(Generic[Network]):
     """Exponential moving average of a network's weights; its buffers are copied.
 
     Attributes
@@ -128,12 +130,12 @@ class Average:
     network : the averaged copy, in evaluation mode, without gradients.
     """
 
-    def __init__(self, network: nn.Module, decay: float) -> None:
+    def __init__(self, network: Network, decay: float) -> None:
         self.network = copy.deepcopy(network).eval().requires_grad_(False)
         self.decay = decay
 
     @torch.no_grad()
-    def update(self, network: nn.Module) -> None:
+    def update(self, network: Network) -> None:
         """Move by ``1 - decay`` towards the weights of ``network``."""
         for mine, theirs in zip(self.network.parameters(), network.parameters(), strict=True):
             mine.lerp_(theirs, 1.0 - self.decay)

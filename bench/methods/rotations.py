@@ -59,6 +59,20 @@ def from_rotation_vector(vector: Tensor) -> Tensor:
     return torch.cat([torch.cos(half), 0.5 * torch.sinc(half / torch.pi) * vector], dim=-1)
 
 
+def to_rotation_vector(rotation: Tensor) -> Tensor:
+    """Logarithm map ``[..., 4] -> [..., 3]``, the shortest way round."""
+    rotation = torch.where(rotation[..., :1] < 0.0, -rotation, rotation)
+    w, xyz = rotation[..., :1], rotation[..., 1:]
+    length = torch.sqrt((xyz * xyz).sum(dim=-1, keepdim=True) + 1e-12)
+    return 2.0 * torch.atan2(length, w) / length * xyz
+
+
+def about_y(angle: Tensor) -> Tensor:
+    """Rotations about the up axis: ``[...]`` radians to ``[..., 4]``."""
+    half, zero = 0.5 * angle, torch.zeros_like(angle)
+    return torch.stack([torch.cos(half), zero, torch.sin(half), zero], dim=-1)
+
+
 def to_matrix(rotation: Tensor) -> Tensor:
     """Unit quaternions ``[..., 4]`` to matrices ``[..., 3, 3]``."""
     w, x, y, z = rotation.unbind(-1)

@@ -174,11 +174,11 @@ class _Groups:
         return self.order[places]
 
 
-def at_training_rate(clip: Clip, answer: Callable[[Clip], Clip]) -> Clip:
-    """The answer to a clip given at 30 fps, brought back to the clip's own fps and number of frames."""
-    if clip.fps == FPS:
+def at_training_rate(clip: Clip, answer: Callable[[Clip], Clip], fps: float = FPS) -> Clip:
+    """The answer to a clip given at a network's frame rate, brought back to the clip's own fps and number of frames."""
+    if clip.fps == fps:
         return answer(clip)
-    back = resample(answer(resample(clip, FPS)), clip.fps)
+    back = resample(answer(resample(clip, fps)), clip.fps)
     frames = np.minimum(np.arange(clip.n_frames), back.n_frames - 1)
     return back.with_motion(back.rotations_wxyz[frames], back.root_xyz_m[frames])
 
