@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bench.adapters.aberman2020 import Aberman2020, Aberman2020Content
 from bench.adapters.anchors import (
     CoinFlip,
     ConcatenatedHalves,
@@ -43,6 +44,8 @@ _TABLE: tuple[type[Adapter], ...] = (
     NearestPose,
     ClassifyAndRetrieve,
     *GESTURE_ORACLES,
+    Aberman2020,
+    Aberman2020Content,
 )
 ADAPTERS: dict[str, type[Adapter]] = {adapter.name: adapter for adapter in _TABLE}
 """Name -> adapter class. The order is the order of rows that tie."""

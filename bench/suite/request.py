@@ -13,6 +13,7 @@ from bench.adapters import ADAPTERS
 from bench.adapters.loading import AdapterSource, find_adapter, source_from_option
 from bench.adapters.post_processed import split_suffix
 from bench.adapters.probe import import_failure
+from bench.datasets.reading import Overrides
 from bench.errors import BadConfig
 from bench.protocols import PROTOCOLS
 from bench.protocols.base import Protocol
@@ -26,6 +27,9 @@ OWN_PROTOCOLS = {
 }
 """Track -> our own protocol for it."""
 
+ANCHORS = tuple(name for name, adapter in ADAPTERS.items() if adapter.kind == "anchor")
+"""What runs where no method is named: rows of known meaning, which train in seconds or not at all."""
+
 
 @dataclass(frozen=True)
 class RunRequest:
@@ -34,7 +38,8 @@ class RunRequest:
     Attributes
     ----------
     data : dataset name -> path (None for generated data).
-    methods : names; empty means all anchors and fast methods that fit the dataset, unless ``only_files``.
+    overrides : unit, up axis and frame rate of the files of all of them, where they are given.
+    methods : names; empty means all anchors, unless ``only_files``.
     adapter_files : ``FILE.py[:Class]`` or ``adapter.toml`` each, run beside the methods.
     only_files : without ``methods``, run nothing but the adapter files: their rows will stand beside others.
     tracks : our own protocol of each of these tracks.
@@ -65,6 +70,7 @@ class RunRequest:
     retrain_judges: bool = False
     limits: Limits = field(default_factory=Limits)
     command: str = ""
+    overrides: Overrides | None = None
 
 
 def sources_of(request: RunRequest) -> list[AdapterSource]:
@@ -74,7 +80,7 @@ def sources_of(request: RunRequest) -> list[AdapterSource]:
     ------
     BadConfig : an unknown name or file.
     """
-    names = request.methods or (() if request.only_files else tuple(ADAPTERS))
+    names = request.methods or (() if request.only_files else ANCHORS)
     sources = [AdapterSource(name) for name in names]
     for source in sources:
         find_adapter(source)

@@ -65,7 +65,7 @@ def fitted(adapter: Adapter) -> Adapter:
     return adapter
 
 
-NORMAL = [adapter for adapter in ADAPTERS.values() if not issubclass(adapter, Oracle)]
+NORMAL = [a for a in ADAPTERS.values() if a.kind == "anchor" and not issubclass(a, Oracle)]
 
 
 def answers(adapter: Adapter, source: Take, style: Take) -> dict[str, Clip]:
