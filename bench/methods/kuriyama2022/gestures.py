@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.arrays import FloatArray
-from bench.methods.windows import on_the_clock_of
 from bench.motion import quat
 from bench.motion.clip import Clip
 from bench.motion.edit import resample
@@ -57,22 +56,19 @@ def gesture_of(clip: Clip) -> Gesture:
 
 
 def clip_of(upper: FloatArray, lower: FloatArray, content: Clip) -> Clip:
-    """The motion of decoded maps ``[T, 39]`` and ``[T, 24]`` at 60 fps on the content's bones.
+    """The motion of decoded maps ``[T, 39]`` and ``[T, 24]`` on the bones of a content at 60 fps, with its heading.
 
-    Heading and the root's first place are the content's, as are frame rate and number of frames; the rest of the root's
-    path follows from the feet.
+    The root starts where the content's does; the rest of its path follows from the feet.
     """
-    timed = resample(content, FPS)
-    n_frames = timed.n_frames
+    n_frames = content.n_frames
     vectors = np.empty((n_frames, N_JOINTS, 3))
     vectors[:, UPPER_JOINTS] = upper.reshape(n_frames, len(UPPER_JOINTS), 3)
     vectors[:, LOWER_JOINTS] = lower.reshape(n_frames, len(LOWER_JOINTS), 3)
-    _, yaw = heading_removed(timed)
+    _, yaw = heading_removed(content)
     rotations, _ = yaw_aligned(quat.from_rotation_vector(vectors), np.zeros((n_frames, 3)), -yaw)
-    root = root_on_planted_foot(
-        rotations, timed.skeleton, timed.root_xyz_m[0, [0, 2]], floor_height(world_positions(timed))
-    )
-    return on_the_clock_of(content, Clip(timed.skeleton, rotations, root, FPS))
+    floor_m = floor_height(world_positions(content))
+    root = root_on_planted_foot(rotations, content.skeleton, content.root_xyz_m[0, [0, 2]], floor_m)
+    return content.with_motion(rotations, root)
 
 
 def root_on_planted_foot(

@@ -17,7 +17,7 @@ from bench.arrays import FloatArray
 from bench.datasets.take import Take
 from bench.errors import BadData
 from bench.methods.kuriyama2022.autoencoder import FRAMES_A_LATENT, GestureAutoencoder, restoration_loss
-from bench.methods.kuriyama2022.gestures import UPPER_CHANNELS, Gesture, clip_of, gesture_of
+from bench.methods.kuriyama2022.gestures import FPS, UPPER_CHANNELS, Gesture, clip_of, gesture_of
 from bench.methods.kuriyama2022.losses import LOSSES, losses_of
 from bench.methods.kuriyama2022.tokens import STRIDE, latents_of, tokens_of
 from bench.methods.kuriyama2022.transformer import (
@@ -28,6 +28,7 @@ from bench.methods.kuriyama2022.transformer import (
     whitened,
 )
 from bench.methods.training import Curves, FitRequest, Stateful, Trainable, seeded, train
+from bench.methods.windows import at_training_rate
 from bench.motion.clip import Clip
 from bench.motion.edit import mirror
 
@@ -105,14 +106,15 @@ class GestureTransfer(nn.Module):
     @torch.inference_mode()
     def transfer(self, content: Clip, style: Clip) -> Clip:
         """The content's gesture in the style's style, on the content's bones and clock."""
-        gesture = gesture_of(content)
         styles = [gesture_of(style), gesture_of(mirror(style))]
         latents = torch.cat([self.autoencoder.encoder(channels_of(one.upper)) for one in styles], dim=2)
-        upper, lower = self.autoencoder.decode(
-            self.swapped(self.autoencoder.encoder(channels_of(gesture.upper)), latents)
-        )
-        n_frames = len(gesture.upper)
-        return clip_of(_frames_of(upper, n_frames), _frames_of(lower, n_frames), content)
+
+        def answer(clip: Clip) -> Clip:
+            encoded = self.autoencoder.encoder(channels_of(gesture_of(clip).upper))
+            upper, lower = self.autoencoder.decode(self.swapped(encoded, latents))
+            return clip_of(_frames_of(upper, clip.n_frames), _frames_of(lower, clip.n_frames), clip)
+
+        return at_training_rate(content, answer, FPS)
 
 
 def train_gestures(config: KuriyamaConfig, request: FitRequest) -> tuple[KuriyamaConfig, GestureTransfer, Curves]:

@@ -15,7 +15,7 @@ from bench.methods.motion_puzzle.graphs import PART_NAMES
 from bench.methods.motion_puzzle.losses import drawn_parts, losses_of, weights_of
 from bench.methods.motion_puzzle.network import PartStyles, PuzzleNetwork, Shape, StyleFeatures
 from bench.methods.training import Curves, FitRequest, Stateful, Trainable, seeded, train
-from bench.methods.windows import FPS, Draws, Standardise, cut_windows, on_the_clock_of, padded_frames
+from bench.methods.windows import FPS, Draws, Standardise, at_training_rate, cut_windows, padded_frames
 from bench.motion.clip import Clip
 from bench.motion.edit import resample
 
@@ -92,7 +92,6 @@ class MotionPuzzle(nn.Module):
 
         The ablation without parts gives the style of the first named part to the whole body.
         """
-        motion = self._motion(content)
         encoded: dict[int, StyleFeatures] = {}
 
         def features(clip: Clip) -> StyleFeatures:
@@ -104,8 +103,13 @@ class MotionPuzzle(nn.Module):
         part_styles: PartStyles = [
             [(features(clip), weight) for clip, weight in styles.get(part, own)] for part in PART_NAMES
         ]
-        answer = self.network.decode(self.network.content(motion), part_styles)
-        return self._clip(answer, content)
+
+        def answer(clip: Clip) -> Clip:
+            decoded = self.network.decode(self.network.content(self._motion(clip)), part_styles)
+            features = self.standardise.inverse(decoded[0].permute(1, 2, 0))[: clip.n_frames]
+            return clip_from_puzzle(features.numpy().astype(np.float64), clip)
+
+        return at_training_rate(content, answer)
 
     def _motion(self, clip: Clip) -> Tensor:
         """``[1, C, T, 21]``, normalised; mirrored in time at the end up to a length that the graphs can halve twice."""
@@ -116,11 +120,6 @@ class MotionPuzzle(nn.Module):
         used = torch.from_numpy(features[..., : len(self.standardise.mean)].astype(np.float32))
         standard: Tensor = self.standardise(used)
         return standard.permute(2, 0, 1)[None].contiguous()
-
-    def _clip(self, answer: Tensor, content: Clip) -> Clip:
-        at_30_fps = resample(content, FPS)
-        features = self.standardise.inverse(answer[0].permute(1, 2, 0))[: at_30_fps.n_frames]
-        return on_the_clock_of(content, clip_from_puzzle(features.numpy().astype(np.float64), at_30_fps))
 
 
 def train_puzzle(config: PuzzleConfig, request: FitRequest) -> tuple[PuzzleConfig, MotionPuzzle, Curves]:
