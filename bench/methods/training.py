@@ -163,7 +163,13 @@ def seeded(seed: int, device: str = "cpu") -> Iterator[torch.Generator]:
     """Torch seeded, on one thread, both put back afterwards; yields a CPU generator of its own.
 
     Initial weights and dropout draw from torch's global generator, all else from the one that is yielded.
+
+    Raises
+    ------
+    BadConfig : a GPU is asked for and there is none.
     """
+    if torch.device(device).type == "cuda" and not torch.cuda.is_available():
+        raise BadConfig("torch finds no CUDA device here", where="--device", remedy="--device cpu")
     threads = torch.get_num_threads()
     devices = [torch.cuda.current_device()] if torch.device(device).type == "cuda" else []
     with torch.random.fork_rng(devices=devices):

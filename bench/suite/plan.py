@@ -27,6 +27,7 @@ class Cell:
     """Method x protocol x dataset x seed: the unit that is run, cached, failed and resumed.
 
     ``settled`` is the outcome where it is known before anything runs: not supported, or not to be imported.
+    ``device`` is where the method is trained; it answers on the CPU.
     """
 
     source: AdapterSource
@@ -37,6 +38,7 @@ class Cell:
     motions_key: str
     given: bool
     settled: Outcome | None = None
+    device: str = "cpu"
 
 
 def plan_cells(
@@ -76,6 +78,7 @@ def _cell(setting: Setting, source: AdapterSource, adapter: type[Adapter], seed:
         ),
         given=not issubclass(adapter, Oracle),
         settled=Outcome("unsupported", reason) if (reason := _unsupported(adapter, setting)) else None,
+        device=device,
     )
 
 

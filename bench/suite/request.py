@@ -31,6 +31,9 @@ ANCHORS = tuple(name for name, adapter in ADAPTERS.items() if adapter.kind == "a
 """What runs where no method is named: rows of known meaning, which train in seconds or not at all."""
 
 
+DEVICES = ("cpu", "cuda")
+
+
 @dataclass(frozen=True)
 class RunRequest:
     """What to run.
@@ -49,6 +52,7 @@ class RunRequest:
     scheduler : address of a Dask scheduler, or the file that it wrote; empty for ``jobs`` processes of this machine.
     keep_failures : cells that failed in an earlier run with this store keep that outcome and are not tried again.
     seeds : methods that are trained run once with each; all other rows run once, with the first.
+    device : where methods are trained, ``cpu`` or ``cuda``; weights of one are not those of the other.
     command : as typed, for the records.
     """
 
@@ -66,6 +70,7 @@ class RunRequest:
     keep_failures: bool = False
     seeds: tuple[int, ...] = (0,)
     budget: str = "small"
+    device: str = "cpu"
     split: str = "default"
     retrain_judges: bool = False
     limits: Limits = field(default_factory=Limits)
@@ -169,6 +174,18 @@ def check_request(request: RunRequest) -> None:
         raise BadConfig(f"expected different numbers from 0 on, got {seeds}", where="--seeds")
     for option, folder in (("--out", request.out), ("--store", request.store)):
         _check_writable(folder, option)
+
+
+def checked_device(device: str) -> str:
+    """The device, if methods can be asked to train there.
+
+    Raises
+    ------
+    BadConfig : neither ``cpu`` nor ``cuda``.
+    """
+    if device not in DEVICES:
+        raise BadConfig(f"unknown device {device!r}", where="--device", remedy=f"choose {' or '.join(DEVICES)}")
+    return device
 
 
 def _check_writable(folder: Path, option: str) -> None:

@@ -40,6 +40,7 @@ def job_of(setting: Setting, cell: Cell, store: Store, work: GenerateJob) -> Job
         budget=cell.budget,
         seed=cell.seed,
         cells=(work,),
+        device=cell.device,
     )
 
 
