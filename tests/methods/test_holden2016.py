@@ -11,6 +11,7 @@ from bench.methods.holden2016 import holden2016 as holden
 from bench.methods.holden2016.constraints import bone_lengths, constraints, foot_slide, path_velocities, trajectory
 from bench.methods.holden2016.network import MotionAutoencoder, reconstruction_loss, sparsity_loss
 from bench.methods.layers import gram, n_parameters
+from bench.methods.training import FitRequest
 from bench.motion.clip import Clip
 from bench.motion.edit import crop
 from bench.motion.holden_features import UNITS_PER_STATURE, holden_features
@@ -30,11 +31,12 @@ def takes() -> list[Take]:
     ]
 
 
-def silent(what: str, done: int, total: int) -> None: ...
+def request(seed: int = 0) -> FitRequest:
+    return FitRequest(takes(), seed, "smoke", "cpu", None, lambda what, done, total: None)
 
 
-def fitted(seed: int = 0) -> MotionAutoencoder:
-    return holden.fit(takes(), TINY, seed=seed, progress=silent)[0]
+def fitted() -> MotionAutoencoder:
+    return holden.train_holden(TINY, request())[1]
 
 
 def test_parameters_at_full_width() -> None:
@@ -189,9 +191,9 @@ def test_matching_style_lowers_the_loss_from_noise() -> None:
 
 def test_training_is_deterministic_and_lowers_the_loss() -> None:
     config = replace(TINY, n_steps=60)
-    network, curves = holden.fit(takes(), config, seed=3, progress=silent)
-    again, _ = holden.fit(takes(), config, seed=3, progress=silent)
-    other, _ = holden.fit(takes(), config, seed=4, progress=silent)
+    _, network, curves = holden.train_holden(config, request(3))
+    _, again, _ = holden.train_holden(config, request(3))
+    _, other, _ = holden.train_holden(config, request(4))
     torch.testing.assert_close(network.encoder.weight, again.encoder.weight, rtol=0.0, atol=0.0)
     assert not torch.equal(network.encoder.weight, other.encoder.weight)
     losses = curves.values[:, curves.names.index("reconstruction")]

@@ -9,20 +9,18 @@ Differences from the paper and the released code: docs/methods/holden2016.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from bench.arrays import FloatArray
-from bench.datasets.take import Take
 from bench.methods.holden2016.constraints import constraints, path_velocities
 from bench.methods.holden2016.network import MotionAutoencoder, reconstruction_loss, sparsity_loss
 from bench.methods.layers import gram, held_to
-from bench.methods.training import Curves, Losses, Progress, Stateful, Trainable, seeded, train
+from bench.methods.training import Curves, FitRequest, Losses, Stateful, Trainable, seeded, train
 from bench.methods.windows import Windows, cut_windows, to_tensor
 from bench.motion.clip import Clip
 from bench.motion.holden_features import (
@@ -114,25 +112,23 @@ class AutoencoderTraining(Trainable):
         return losses
 
 
-def fit(
-    takes: Sequence[Take],
-    config: Holden2016Config,
-    *,
-    seed: int,
-    progress: Progress,
-    device: str = "cpu",
-    checkpoints: Path | None = None,
-) -> tuple[MotionAutoencoder, Curves]:
+def train_holden(config: Holden2016Config, request: FitRequest) -> tuple[Holden2016Config, MotionAutoencoder, Curves]:
     """Train the autoencoder on all windows of the takes; their labels are not looked at."""
-    with seeded(seed, device) as generator:
+    with seeded(request.seed, request.device) as generator:
         windows = cut_windows(
-            takes, lambda clip: holden_features(clip)[0], n_frames=config.window_frames, stride=config.window_stride
+            request.takes,
+            lambda clip: holden_features(clip)[0],
+            n_frames=config.window_frames,
+            stride=config.window_stride,
         )
         network = build(config)
         network.fit_standardise(windows.features)
-        training = AutoencoderTraining(network.to(device).train(), windows.to(device), config, generator)
-        curves = train(training, config.n_steps, progress=progress, name="holden2016", checkpoints=checkpoints)
-    return network.eval(), curves
+        network.to(request.device).train()
+        training = AutoencoderTraining(network, windows.to(request.device), config, generator)
+        curves = train(
+            training, config.n_steps, progress=request.progress, name="holden2016", checkpoints=request.checkpoints
+        )
+    return config, network.eval(), curves
 
 
 @torch.no_grad()
@@ -150,7 +146,8 @@ def transfer(
     styled = match_style(network.encode(noise), hidden, style_gram, config)
     content_motion = network.standardise.inverse(motion.transpose(1, 2))[0].T  # [73, T]
     path = scaled_path(_decoded(network, styled), content_motion)
-    bound_motion = obey_constraints(network, styled, content_motion, path, content, config)
+    projected = network.encode(network.decode(styled))
+    bound_motion = obey_constraints(network, projected, content_motion, path, content, config)
     bound_motion[HOLDEN_SLICES["velocity_xz"].start : HOLDEN_SLICES["yaw_velocity"].stop] = path
     return _to_clip(bound_motion[:, : content.n_frames], start, content)
 
