@@ -1,0 +1,1 @@
+"""Tao et al. 2022, Style-ERD: responsive and coherent online motion style transfer."""
