@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench import __version__, console
-from bench.data_commands import data_app
+from bench.data_commands import FpsOption, UnitOption, UpOption, data_app, overrides_of
 from bench.errors import BadConfig, BenchError
 
 if TYPE_CHECKING:
+    from bench.datasets.reading import Overrides
     from bench.suite.request import RunRequest
     from bench.suite.submit import Data
 
@@ -76,7 +77,11 @@ def run(
         str, typer.Option("--seeds", "--seed", help="Comma-separated; methods that fit run once with each.")
     ] = "0",
     budget: Annotated[str, typer.Option(help="Training budget of methods that fit.")] = "small",
+    device: Annotated[str, typer.Option(help="Where methods are trained: cpu or cuda.")] = "cpu",
     split: Annotated[str, typer.Option(help="default, contiguous or interleaved.")] = "default",
+    unit: UnitOption = "",
+    up: UpOption = "",
+    fps: FpsOption = None,
     against: Annotated[str, typer.Option(help="Rows to stand beside: leaderboard, or a run folder.")] = "",
     retrain_judges: Annotated[bool, typer.Option(help="Train judges here; do not use the committed ones.")] = False,
     dry_run: Annotated[bool, typer.Option(help="Print cells, minutes and disk; run nothing.")] = False,
@@ -92,6 +97,7 @@ def run(
 
     request = asked.RunRequest(
         data=_data_options(data or ["procedural"]),
+        overrides=overrides_of(unit, up, fps),
         out=out or asked.default_out(RUNS),
         store=store,
         methods=_names(methods),
@@ -105,6 +111,7 @@ def run(
         keep_failures=keep_failures,
         seeds=_seeds(seeds),
         budget=budget,
+        device=device,
         split=split,
         retrain_judges=retrain_judges,
         command=shlex.join(["stylebench", *sys.argv[1:]]),
@@ -118,10 +125,51 @@ def run(
         asked.latest_link(request.out)
     if against:
         stand_beside(request.out, against)
+    for note in result.notes:
+        console.remark(note)
     for left in result.left_out:
         console.complain(f"left out: {left}")
     failed = _report_run(request.out, as_json, f"{result.generated} cells generated, {result.scored} metrics computed")
     if failed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def fit(
+    methods: Annotated[str, typer.Option(help="Comma-separated names.")] = "",
+    data: Annotated[
+        list[str] | None, typer.Option(help="Dataset as NAME or NAME=PATH; repeat for several. Default: procedural.")
+    ] = None,
+    adapter: Annotated[list[str] | None, typer.Option(help="Your adapter, FILE.py or FILE.py:Class.")] = None,
+    budget: Annotated[str, typer.Option(help="smoke, small or paper.")] = "small",
+    seeds: Annotated[str, typer.Option("--seeds", "--seed", help="Comma-separated; one training with each.")] = "0",
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    split: Annotated[str, typer.Option(help="default, contiguous or interleaved.")] = "default",
+    jobs: Annotated[int, typer.Option(min=1, help="Trainings at a time, one core each.")] = 2,
+    out: Annotated[Path, typer.Option(help="Folder for loss curves and logs.")] = RUNS / "fits",
+    store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
+    as_json: Annotated[bool, typer.Option("--json", help="Print results as JSON.")] = False,
+) -> None:
+    """Train what the store lacks; a training that was interrupted goes on where it stopped.
+
+    Example: stylebench fit --methods aberman2020 --budget smoke --seeds 0,1
+    """
+    from bench.suite.fitting import FitOrder, fit_all, table_of
+
+    order = FitOrder(
+        data=_data_options(data or ["procedural"]), methods=_names(methods), adapter_files=tuple(adapter or ()),
+        budget=budget, seeds=_seeds(seeds), device=device, split=split, jobs=jobs, out=out, store=store,
+        command=shlex.join(["stylebench", *sys.argv[1:]]),
+    )  # fmt: skip
+    with console.ProgressDisplay() as progress:
+        found = fit_all(order, progress)
+    headers, rows = table_of(found)
+    if as_json:
+        console.say_json([dict(zip(headers, row, strict=True)) for row in rows])
+    else:
+        console.show_rows(headers, rows)
+        console.say(f"loss curves in {out}")
+    if any(row.outcome.status != "ok" for row in found):
         raise typer.Exit(1)
 
 
@@ -187,6 +235,9 @@ def export_tasks(
     motions: Annotated[str, typer.Option(help="bvh or npz.")] = "bvh",
     labels: Annotated[str, typer.Option(help="Of style, content, source-style: what the method needs.")] = "",
     with_fit: Annotated[bool, typer.Option("--with-fit", help="Also write what may be trained on.")] = False,
+    unit: UnitOption = "",
+    up: UpOption = "",
+    fps: FpsOption = None,
     store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
 ) -> None:
     """Write the tasks as motion files, to be answered anywhere with any tool.
@@ -197,7 +248,7 @@ def export_tasks(
 
     traits = submit.traits_of_labels(_names(labels))
     with console.ProgressDisplay() as progress:
-        setting = submit.setting_of(_data(data), protocol, profile, store, progress)
+        setting = submit.setting_of(_data(data, overrides_of(unit, up, fps)), protocol, profile, store, progress)
         path = submission.export_tasks(
             setting, out, traits=traits, motions=motions, with_fit=with_fit,
             progress=lambda what, done, total: progress("data", what, done, total),
@@ -209,6 +260,9 @@ def export_tasks(
 def score(
     folder: Annotated[Path, typer.Argument(help="A folder of exported tasks with all answers.")],
     data: Annotated[str, typer.Option(help="Dataset as NAME or NAME=PATH.")] = "procedural",
+    unit: UnitOption = "",
+    up: UpOption = "",
+    fps: FpsOption = None,
     against: Annotated[str, typer.Option(help="Rows to stand beside: leaderboard, or a run folder.")] = "",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<time>, and runs/latest.")] = None,
     store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
@@ -231,7 +285,7 @@ def score(
         command=shlex.join(["stylebench", *sys.argv[1:]]),
     )
     with console.ProgressDisplay() as progress:
-        setting = submit.exported_setting(folder, _data(data), store, progress)
+        setting = submit.exported_setting(folder, _data(data, overrides_of(unit, up, fps)), store, progress)
         record = submit.score_submission(folder, setting, request, progress)
     if out is None:
         asked.latest_link(request.out)
@@ -302,6 +356,80 @@ def leaderboard(
 
 
 @app.command()
+def ladder(
+    data: Annotated[
+        list[str] | None, typer.Option(help="Measure this dataset, NAME or NAME=PATH; default: use stored numbers.")
+    ] = None,
+    samples: Annotated[int, typer.Option(min=130, help="Windows a level.")] = 200,
+    check: Annotated[bool, typer.Option("--check", help="Only compare; exit 1 on a difference.")] = False,
+    numbers: Annotated[Path, typer.Option(help="Folder of stored numbers.")] = Path("reports/published/ladder"),
+    docs: Annotated[Path, typer.Option(help="Folder of the page and its figure.")] = Path("docs/metrics"),
+    store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
+) -> None:
+    """Corrupt real motion step by step and see what every metric makes of it.
+
+    Example: stylebench ladder --data procedural
+    """
+    from bench.datasets.table import load_dataset
+    from bench.suite.ladder import page
+    from bench.suite.ladder.climb import measured
+    from bench.suite.store import Store
+    from reports.ladder import write_rungs
+
+    with console.ProgressDisplay() as progress:
+        for name, path in _data_options(data or []).items():
+            dataset = load_dataset(name, path, lambda what, done, total: progress("data", what, done, total))
+            write_rungs(numbers / f"{name}.csv", measured(dataset, samples, Store(store), progress))
+    stored = page.stored_rungs(numbers)
+    wrong = page.contradictions(page.all_cells(stored))
+    for line in wrong:
+        console.complain(line)
+    if check:
+        changed = page.difference(docs, stored)
+        if changed:
+            console.say(changed)
+        if changed or wrong:
+            raise typer.Exit(1)
+        return
+    for path in page.write_page(docs, stored):
+        console.say(f"wrote {path}")
+    if wrong:
+        raise typer.Exit(1)
+
+
+@app.command()
+def trust(
+    run_folders: Annotated[list[Path] | None, typer.Argument(help="Run folders of the transfer track.")] = None,
+    data: Annotated[list[str] | None, typer.Option(help="Dataset as NAME or NAME=PATH; default: procedural.")] = None,
+    store: Annotated[Path, typer.Option(help="The store of those runs; it has their motions.")] = STORE,
+    check: Annotated[bool, typer.Option("--check", help="Only compare; exit 1 on a difference.")] = False,
+    numbers: Annotated[Path, typer.Option(help="Folder of stored numbers.")] = Path("reports/published_trust"),
+    page: Annotated[Path, typer.Option(help="The page; its figure lies beside it.")] = Path("docs/trust.md"),
+    cards: Annotated[bool, typer.Option("--cards", help="Also note the agreement on the judges' cards.")] = False,
+) -> None:
+    """Judge stored motions with a second judge family and write docs/trust.md; without run folders from stored numbers.
+
+    Example: stylebench trust runs/latest --data bandai-namco=bandai.zip
+    """
+    from bench.suite import trust as measured
+    from reports.trust_page import check_page, write_page
+
+    if check:
+        difference = check_page(page, numbers)
+        if difference:
+            console.say(difference)
+            raise typer.Exit(1)
+        return
+    if run_folders:
+        with console.ProgressDisplay() as progress:
+            found = measured.measure(run_folders, _data_options(data or ["procedural"]), store, progress)
+        measured.publish(found, numbers, page, cards=cards)
+    else:
+        write_page(numbers, page)
+    console.say(f"wrote {page}")
+
+
+@app.command()
 def clean(
     runs: Annotated[Path, typer.Option(help="Folder of runs.")] = RUNS,
     everything: Annotated[bool, typer.Option("--all", help="Also remove run folders, not only the store.")] = False,
@@ -331,11 +459,11 @@ def _seeds(option: str) -> tuple[int, ...]:
     return tuple(int(name) for name in names)
 
 
-def _data(option: str) -> Data:
+def _data(option: str, overrides: Overrides | None = None) -> Data:
     from bench.suite.submit import Data
 
     [(name, path)] = _data_options([option]).items()
-    return Data(name, path)
+    return Data(name, path, overrides)
 
 
 def _data_options(options: list[str]) -> dict[str, Path | None]:
@@ -364,6 +492,8 @@ def _print_plan(request: RunRequest, as_json: bool) -> None:
         ]
         for setting, _, cost in plans
     ]
+    for note in dict.fromkeys(note for setting, _, _ in plans for note in setting.dataset.said):
+        console.remark(note)
     headers = ["dataset", "protocol", "cells", "to generate", "minutes", "MB on disk"]
     if as_json:
         console.say_json([dict(zip(headers, row, strict=True)) for row in rows])

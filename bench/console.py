@@ -97,6 +97,11 @@ def say_json(value: Any) -> None:
     sys.stdout.write(json.dumps(value, indent=1, sort_keys=True) + "\n")
 
 
+def remark(text: str) -> None:
+    """One line on stderr that is no error: what was assumed."""
+    sys.stderr.write("note: " + " ".join(text.split()) + "\n")
+
+
 def complain(text: str) -> None:
     """One line on stderr."""
     sys.stderr.write("error: " + " ".join(text.split()) + "\n")

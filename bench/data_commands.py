@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bench import console
 from bench.errors import BadConfig
 
+if TYPE_CHECKING:
+    from bench.datasets.reading import Overrides
+
 data_app = typer.Typer(help="Look at datasets.", no_args_is_help=True, rich_markup_mode=None)
 
 JSON_OPTION = typer.Option("--json", help="Print as JSON.")
+UnitOption = Annotated[str, typer.Option("--unit", help="Of the files: m, cm, mm, inch, cmu, or metres per unit.")]
+UpOption = Annotated[str, typer.Option("--up", help="Up axis of the files, y or z.")]
+FpsOption = Annotated[float | None, typer.Option("--fps", help="Frames per second, instead of the frame times.")]
 
 
 @data_app.command()
 def info(
     name: Annotated[str, typer.Argument(help="NAME or NAME=PATH")],
+    unit: UnitOption = "",
+    up: UpOption = "",
+    fps: FpsOption = None,
     as_json: Annotated[bool, JSON_OPTION] = False,
 ) -> None:
     """Print counts, durations, split and licence of a dataset.
@@ -29,7 +38,12 @@ def info(
 
     dataset_name, path = _named_path(name)
     with console.ProgressDisplay() as progress:
-        dataset = load_dataset(dataset_name, path, lambda what, done, total: progress("data", what, done, total))
+        dataset = load_dataset(
+            dataset_name,
+            path,
+            lambda what, done, total: progress("data", what, done, total),
+            overrides_of(unit, up, fps),
+        )
     facts = describe_dataset(dataset)
     if as_json:
         console.say_json(facts)
@@ -108,9 +122,9 @@ def fetch(
 def skeleton(
     file: Annotated[Path, typer.Argument(help="A BVH file.")],
     joint_map: Annotated[str, typer.Option("--map", help="Known skeleton, or your own map as FILE.toml.")] = "",
-    unit: Annotated[str, typer.Option(help="m, cm, mm, inch, cmu, or metres per file unit.")] = "",
-    up: Annotated[str, typer.Option(help="y or z.")] = "",
-    fps: Annotated[float, typer.Option(help="Frames per second, instead of the frame time.")] = 0.0,
+    unit: UnitOption = "",
+    up: UpOption = "",
+    fps: FpsOption = None,
     as_json: Annotated[bool, JSON_OPTION] = False,
 ) -> None:
     """Show how the joints of a file are understood: matched, virtual, missing; and unit, up axis and stature.
@@ -119,8 +133,8 @@ def skeleton(
     """
     from bench.suite.skeleton_report import skeleton_report
 
-    options: dict[str, str | float] = {"skeleton": joint_map, "unit": unit, "up": up, "fps": fps}
-    report = skeleton_report(file, {name: value for name, value in options.items() if value})
+    options: dict[str, str | float] = {"skeleton": joint_map} if joint_map else {}
+    report = skeleton_report(file, options | overrides_of(unit, up, fps).given)
     if as_json:
         console.say_json({"facts": report.facts, "joints": report.joints})
     else:
@@ -129,6 +143,13 @@ def skeleton(
         console.show_rows(["canonical joint", "state", "joint of the file"], report.joints)
     if not report.complete:
         raise typer.Exit(1)
+
+
+def overrides_of(unit: str, up: str, fps: float | None) -> Overrides:
+    """What is given on the command line of a dataset's files."""
+    from bench.datasets.reading import Overrides
+
+    return Overrides(unit or None, up.lower() or None, fps)
 
 
 def _named_path(option: str) -> tuple[str, Path | None]:

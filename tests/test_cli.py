@@ -15,7 +15,7 @@ runner = CliRunner()
 COMMANDS = (
     ["run"], ["new-adapter"], ["check"], ["export-tasks"], ["score"], ["list"], ["data", "info"],
     ["data", "verify"], ["data", "fetch"], ["data", "skeleton"], ["report"],
-    ["leaderboard"], ["clean"],
+    ["leaderboard"], ["ladder"], ["clean"],
 )  # fmt: skip
 
 

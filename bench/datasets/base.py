@@ -41,6 +41,11 @@ class Dataset:
     notes: tuple[str, ...] = ()
 
     @property
+    def said(self) -> tuple[str, ...]:
+        """The notes under the dataset's name, for the terminal."""
+        return tuple(f"{self.dataset_id}: {note}" for note in self.notes)
+
+    @property
     def content_labels(self) -> tuple[str, ...]:
         """Judged contents, sorted; a judge's class index is the position in this tuple."""
         return tuple(sorted({self.judged_content[t.content] for t in self.takes if t.content is not None}))

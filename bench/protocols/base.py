@@ -118,7 +118,7 @@ class Protocol:
     primary : the metric and slice rows are ordered by.
     make_tasks : the fixed list.
     extra_takes : makes sequences that no dataset has; None where tasks use the dataset's own takes.
-    extra_fit : whether methods are trained on the extra takes of the fit part instead of the part itself.
+    extra_fit : makes the sequences that methods are trained on; None where that is the fit part itself.
     source_parts, real_parts, floor_parts : where sources and style references, the Frechet reference, and the real
         motion that is compared with it come from.
     trials : profile -> draws for metrics that are means over trials.

@@ -243,8 +243,8 @@ def to_markdown(card: JudgeCard) -> str:
         parts += [
             "## Second family",
             "Convolutions over time on joint positions, trained on the same windows: a check on the first family, "
-            "never averaged in. *Rank agreement* is Kendall's tau between the order in which one judge and the mean of the "
-            "other family put the rows of a run, by recognition of the judge's target; see docs/trust.md.",
+            "never averaged in. *Rank agreement* is Kendall's tau between the order in which one judge and the mean of "
+            "the other family put the rows of a run, by recognition of the judge's target; see docs/trust.md.",
             _table(CLASSIFIER_HEADER, [_classifier_row(judge) for judge in card.second]),
         ]
     if card.other_splits:

@@ -18,6 +18,7 @@ from bench.metrics.memorisation import copy_threshold, pose_descriptors
 from bench.metrics.physics import jerk_per_sample
 from bench.motion.edit import windows
 from bench.protocols.base import Protocol, stable_seed
+from bench.protocols.transfer import WINDOW_FRAMES
 from bench.suite.copying import DescriptorBank
 from bench.suite.embedding import Embedding
 from bench.suite.judges import JudgeSet
@@ -32,7 +33,6 @@ from reports.records import digest_of
 REFERENCE_VERSION = 3
 REAL_STRIDE_FRAMES = 16
 JUDGE_STRIDE_FRAMES = 32
-WINDOW_FRAMES = 64
 LABELS_FILE, JERK_FILE, COMPONENTS_FILE = "labels.npz", "floor_jerk.npy", "components.npz"
 FIT_BANK_FILE, TEST_BANK_FILE, ACTIVATIONS_FILE = "fit_bank.npz", "test_bank.npz", "activations.npz"
 CONDITIONAL_COMPONENTS = 16
@@ -59,7 +59,7 @@ def build_reference(setting: Setting, judges: JudgeSet, embed: Embed, basis: Bas
     """Compute what a judged protocol is scored against and store it into an empty folder."""
     protocol = setting.protocol
     real = windows_of(setting.part(*protocol.real_parts), REAL_STRIDE_FRAMES)
-    floor = _floor_windows(setting, len(basis.tasks))
+    floor = floor_windows(setting, len(basis.tasks))
     for name, motions in (("real", real), ("floor", floor)):
         (folder / name).mkdir()
         embed(motions).save(folder / name)
@@ -151,7 +151,8 @@ def label_indices(labels: Iterable[str], known: Sequence[str]) -> IntArray:
     return np.array([index.get(str(label), -1) for label in labels], dtype=np.int64)
 
 
-def _floor_windows(setting: Setting, n: int) -> Motions:
+def floor_windows(setting: Setting, n: int) -> Motions:
+    """``n`` windows of other real motion, drawn as sources are."""
     takes = setting.part(*setting.protocol.floor_parts)
     rng = np.random.default_rng(stable_seed("floor", setting.protocol.label, setting.dataset.digest))
     return Motions.of([random_window(takes, WINDOW_FRAMES, rng) for _ in range(n)])

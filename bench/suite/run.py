@@ -25,13 +25,14 @@ from reports.records import Record
 class RunResult:
     """What a run left: its records, and how many cells were generated and metrics computed anew.
 
-    ``left_out`` names protocols that a dataset cannot serve, with the reason.
+    ``left_out`` names protocols that a dataset cannot serve, with the reason; ``notes`` what was assumed of the data.
     """
 
     records: tuple[Record, ...]
     generated: int
     scored: int
     left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,8 @@ def run(request: RunRequest, progress: Progress) -> RunResult:
             records.extend(part.records)
             generated += part.generated
             scored += part.scored
-    return RunResult(tuple(records), generated, scored, planned.left_out)
+    notes = tuple(note for dataset in datasets for note in dataset.said)
+    return RunResult(tuple(records), generated, scored, planned.left_out, notes)
 
 
 def fresh_records_folder(out: Path) -> Path:
@@ -94,7 +96,7 @@ def fresh_records_folder(out: Path) -> Path:
 
 def _loaded(request: RunRequest, progress: Progress) -> list[Dataset]:
     return [
-        load_dataset(name, path, lambda what, done, total: progress("data", what, done, total))
+        load_dataset(name, path, lambda what, done, total: progress("data", what, done, total), request.overrides)
         for name, path in request.data.items()
     ]
 
@@ -121,7 +123,7 @@ def _settings(request: RunRequest, datasets: Sequence[Dataset], store: Store) ->
 
 
 def _cells(request: RunRequest, setting: Setting, sources: Sequence[AdapterSource]) -> list[Cell]:
-    cells = plan_cells(setting, sources, seeds=request.seeds, budget=request.budget, device="cpu")
+    cells = plan_cells(setting, sources, seeds=request.seeds, budget=request.budget, device=request.device)
     return [cell for cell in cells if _is_a_row(cell, request)]
 
 

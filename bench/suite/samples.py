@@ -17,10 +17,15 @@ def samples_of(protocol: Protocol, tasks: Sequence[Task], pack: Pack) -> tuple[T
     """One task a sample: a group of the interpolation track, a segment of a long sequence, else the task."""
     if protocol.track == "interpolation":
         return tuple(groups_of(tasks))
-    if any(task.segments for task in tasks):
+    if are_cut(tasks):
         lengths = [pack.rows[task.content_take_id]["n_frames"] for task in tasks]
         return tuple(s for task, n in zip(tasks, lengths, strict=True) for s in segments_of(task, n))
     return tuple(tasks)
+
+
+def are_cut(tasks: Sequence[Task]) -> bool:
+    """Whether answers are long sequences, of which segments are judged."""
+    return any(task.segments for task in tasks)
 
 
 def cut_motions(motions: Motions, tasks: Sequence[Task], samples: Sequence[Task]) -> Motions:
@@ -28,7 +33,7 @@ def cut_motions(motions: Motions, tasks: Sequence[Task], samples: Sequence[Task]
 
     A segment has its piece's content; its style is the sequence's.
     """
-    if not any(task.segments for task in tasks):
+    if not are_cut(tasks):
         return motions
     place = {task.content_take_id: index for index, task in enumerate(tasks)}
     return Motions.of(

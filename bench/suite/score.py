@@ -19,10 +19,10 @@ from bench.suite.answering import source_of
 from bench.suite.embedding import Embedding
 from bench.suite.judges import JudgeSet, load_judges
 from bench.suite.judging import stored_embedding
-from bench.suite.keys import score_key
+from bench.suite.keys import embed_key, score_key
 from bench.suite.motions import Motions
 from bench.suite.reference import label_indices, load_reference, trials_of
-from bench.suite.samples import cut_motions, samples_of
+from bench.suite.samples import are_cut, cut_motions, samples_of
 from bench.suite.scores import SCORES
 from bench.suite.scores.base import Basis, PlainRow, Reference, Row, Scored
 from bench.suite.scores.conditions import SegmentRow
@@ -122,6 +122,11 @@ class Scorer:
         """The contents of all tasks."""
         return Motions.of([source_of(task, self.pack, self.protocol.fps) for task in self.tasks])
 
+    @cached_property
+    def cut_source(self) -> Motions:
+        """What the outputs' windows are compared with."""
+        return cut_motions(self.source, self.tasks, self.samples)
+
     def keys(self, motions_digest: str, given: bool) -> dict[str, str]:
         """Metric name -> score key."""
         return {
@@ -149,20 +154,24 @@ class Scorer:
         """All stored metrics of a cell."""
         digest = str(self.store.facts("motions", motions_key)["motions_digest"])
         scored = {name: self._read(key) for name, key in self.keys(digest, given).items()}
-        embedding = None
-        if self.spec.judges_folder:
-            motions = Motions.load(self.store.folder("motions", motions_key))
-            embedding = self._judged(cut_motions(motions, self.tasks, self.samples))
+        embedding = self._known_embedding(motions_key, digest) if self.spec.judges_folder else None
         return CellScores(digest, self.samples, dict(self.basis.slices), embedding, scored)
+
+    def _known_embedding(self, motions_key: str, digest: str) -> Embedding:
+        """What the judges said; the motions themselves are read only where they were cut before they were judged."""
+        key = embed_key(digest, self.spec.judges_digest)
+        if not are_cut(self.tasks) and self.store.has("embed", key):
+            return Embedding.load(self.store.folder("embed", key))
+        motions = Motions.load(self.store.folder("motions", motions_key))
+        return self._judged(cut_motions(motions, self.tasks, self.samples))
 
     def _row(self, uncut: Motions, given: bool) -> PlainRow:
         motions = cut_motions(uncut, self.tasks, self.samples)
-        source = cut_motions(self.source, self.tasks, self.samples)
         if not self.spec.judges_folder:
-            return PlainRow(motions, source)
+            return PlainRow(motions, self.cut_source)
         judged = Row(
             motions=motions,
-            source=source,
+            source=self.cut_source,
             embedding=self._judged(motions),
             contents=label_indices(motions.contents, self.spec.content_labels),
             styles=label_indices(motions.styles, self.spec.style_labels),

@@ -112,7 +112,7 @@ class SettingRun:
             self.store.put(
                 "reference", key, lambda folder: build_reference(self.setting, judges, embedded, basis, folder)
             )
-        self.progress("reference", "judging real motion", 1, 1)
+        self.progress("reference", "ready", 1, 1)
 
     def _known(self, cell: Cell) -> CellAnswer | None:
         """The answer of a cell that needs no work."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from bench.adapters.base import Traits
 from bench.adapters.loading import AdapterSource
 from bench.adapters.motion_files import read_bounded
+from bench.datasets.reading import Overrides
 from bench.datasets.table import load_dataset
 from bench.errors import BadConfig, BadFile
 from bench.suite.keys import generate_key
@@ -29,10 +30,11 @@ LABELS = ("style", "content", "source-style")
 
 @dataclass(frozen=True)
 class Data:
-    """A dataset as asked for on the command line."""
+    """A dataset as asked for on the command line, with what is given of its files."""
 
     name: str
     path: Path | None = None
+    overrides: Overrides | None = None
 
 
 def setting_of(data: Data, label: str, profile: str, store: Path, progress: Progress) -> Setting:
@@ -44,7 +46,9 @@ def setting_of(data: Data, label: str, profile: str, store: Path, progress: Prog
     """
     protocol = protocol_called(label)
     check_profile(protocol, profile)
-    dataset = load_dataset(data.name, data.path, lambda what, done, total: progress("data", what, done, total))
+    dataset = load_dataset(
+        data.name, data.path, lambda what, done, total: progress("data", what, done, total), data.overrides
+    )
     return prepare(dataset, protocol, profile, Store(store))
 
 

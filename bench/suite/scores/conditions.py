@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from bench.errors import BadInput
 from bench.metrics import paired, physics
 from bench.motion.kinematics import world_positions
 from bench.protocols.base import Task
+from bench.protocols.transfer import WINDOW_FRAMES
 from bench.suite.motions import Motions
 from bench.suite.scores.base import (
     PRIMARY_SLICE,
@@ -24,7 +26,7 @@ from bench.suite.scores.base import (
 )
 from reports.bootstrap import mean_replicates
 
-SEGMENT_FRAMES = 64
+SEGMENT_FRAMES = WINDOW_FRAMES
 BLEND_FRAMES = 10
 """Frames after a join that belong to neither piece: 0.3 s of blending."""
 JOIN_REACH_FRAMES = 8
@@ -45,18 +47,23 @@ def paired_truth(name: str, row: Row, reference: Reference) -> Scored:
     ------
     BadInput : the reference has no true answers.
     """
+    values = np.array([getattr(error, PAIRED_ERRORS[name]) for error in _paired_errors(row, reference)])
+    return mean_score(name, values, reference, slices=("all", PRIMARY_SLICE))
+
+
+@lru_cache(maxsize=1)
+def _paired_errors(row: Row, reference: Reference) -> list[paired.PairedErrors]:
+    """All four errors of every sample: the alignment that some of them need is found once."""
     truth = reference.truth
     if truth is None:
         raise BadInput("paired errors need true answers", where="reference")
     joints = [joint for joint in row.joints if joint in truth.real_joints]
     rotations, outputs = truth.window_rotations_wxyz[:, :, joints], row.motions.window_rotations_wxyz[:, :, joints]
     positions, placed = _from_origin(truth.world_positions()), _from_origin(row.positions_m)
-    errors = [
+    return [
         paired.paired_errors(rotations[i], outputs[i], positions[i][:, joints], placed[i][:, joints])
         for i in range(row.motions.n)
     ]
-    values = np.array([getattr(error, PAIRED_ERRORS[name]) for error in errors])
-    return mean_score(name, values, reference, slices=("all", PRIMARY_SLICE))
 
 
 def _from_origin(positions_m: FloatArray) -> FloatArray:

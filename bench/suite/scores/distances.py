@@ -109,7 +109,7 @@ def _left_out(reference: Reference) -> str:
 
 def set_distance(name: str, features: str, row: Row, reference: Reference) -> Scored:
     """FMD or KID of whole feature sets (a field of ``Embedding``), mean over judge seeds."""
-    exact = _frechet if name.startswith("fmd") else kernel.kernel_distance
+    exact = frechet_value if name.startswith("fmd") else kernel.kernel_distance
     resample = frechet.frechet_replicates if name.startswith("fmd") else kernel.kernel_replicates
     real, generated = (
         getattr(embedding, features).astype(np.float64) for embedding in (reference.real.embedding, row.embedding)
@@ -143,7 +143,7 @@ def floors(reference: Reference, names: Sequence[str]) -> dict[str, float]:
     for name in names:
         if name in SET_FEATURES or name == "fmd[stgcn]":
             features = SET_FEATURES.get(name, "content_features")
-            exact = _frechet if name.startswith("fmd") else kernel.kernel_distance
+            exact = frechet_value if name.startswith("fmd") else kernel.kernel_distance
             real, floor = (
                 getattr(side.embedding, features).astype(np.float64) for side in (reference.real, reference.floor)
             )
@@ -155,5 +155,6 @@ def floors(reference: Reference, names: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def _frechet(real: FloatArray, generated: FloatArray) -> float:
-    return frechet.frechet_distance(real, generated).value
+def frechet_value(real: NDArray[np.floating], generated: NDArray[np.floating]) -> float:
+    """Frechet distance of two sets of features ``[n, d]``, in double precision."""
+    return frechet.frechet_distance(real.astype(np.float64), generated.astype(np.float64)).value

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from bench.arrays import FloatArray, IntArray
 from bench.errors import BadInput
-from bench.metrics import frechet, recognition
+from bench.metrics import recognition
 from bench.motion.representation import JUDGE_SLICES
 from bench.suite.judges import JudgeSet
 from bench.suite.motions import Motions
 from bench.suite.scores.base import PRIMARY_SLICE, Reference, Row, Scored, measure, share_score
+from bench.suite.scores.distances import frechet_value
 from classifiers.embed import encode
 
 CLIP_FRAMES = 24
@@ -54,7 +55,7 @@ def activation_floors(
 ) -> dict[str, float]:
     """Metric -> distance of other real motion from the reference, mean over judge seeds."""
     return {
-        name: float(np.mean([_distance(r, f) for r, f in zip(real[cut], floor[cut], strict=True)]))
+        name: float(np.mean([frechet_value(r, f) for r, f in zip(real[cut], floor[cut], strict=True)]))
         for name, cut in CUT_OF.items()
     }
 
@@ -82,8 +83,9 @@ def _over_trials(
     if min(n_real, samples * per_sample) < 2 * d:
         reason = f"n = {min(n_real, samples * per_sample)} is below 2 d = {2 * d}: the number would be mostly bias"
         return Scored((measure(name, "all", float("nan"), samples, details=details, reason=reason),))
-    pairs = [(r.astype(np.float64), g.astype(np.float64)) for r, g in zip(real, generated, strict=True)]
-    table = np.array([[_frechet(r, g, trial, per_sample) for r, g in pairs] for trial in reference.trials])
+    pairs = list(zip(real, generated, strict=True))
+    rows = [(trial[:, None] * per_sample + np.arange(per_sample)).reshape(-1) for trial in reference.trials]
+    table = np.array([[frechet_value(r, g[drawn]) for r, g in pairs] for drawn in rows])
     by_trial, by_judge = table.mean(axis=1), table.mean(axis=0)
     details["trial_sd"] = float(by_trial.std(ddof=1)) if len(by_trial) > 1 else 0.0
     found = measure(
@@ -91,15 +93,6 @@ def _over_trials(
         floor=reference.floors.get(name), details=details,
     )  # fmt: skip
     return Scored((found,), {}, {})
-
-
-def _frechet(real: FloatArray, generated: FloatArray, trial: IntArray, per_sample: int) -> float:
-    rows = (trial[:, None] * per_sample + np.arange(per_sample)).reshape(-1)
-    return frechet.frechet_distance(real, generated[rows]).value
-
-
-def _distance(real: NDArray[np.float32], other: NDArray[np.float32]) -> float:
-    return frechet.frechet_distance(real.astype(np.float64), other.astype(np.float64)).value
 
 
 def cra_top3(row: Row, reference: Reference) -> Scored:

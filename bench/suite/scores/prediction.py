@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -75,6 +76,7 @@ def _slices(basis: Basis) -> list[str]:
     return ["all", *(name for name in basis.slices if name.startswith(("content=", "style=")))]
 
 
+@lru_cache(maxsize=1)
 def _fit_features(basis: Basis) -> FloatArray:
     """Features of evenly spread frames of every fit take."""
     rows = []
