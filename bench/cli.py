@@ -12,16 +12,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench import __version__, console
+from bench.command_options import RUNS, STORE, data_of, datasets_of, names_of, seeds_of
 from bench.data_commands import FpsOption, UnitOption, UpOption, data_app, overrides_of
 from bench.errors import BadConfig, BenchError
+from bench.trust_commands import ladder, trust
 
 if TYPE_CHECKING:
-    from bench.datasets.reading import Overrides
     from bench.suite.request import RunRequest
-    from bench.suite.submit import Data
-
-RUNS = Path("runs")
-STORE = RUNS / "store"
 
 app = typer.Typer(
     name="stylebench",
@@ -96,20 +93,20 @@ def run(
     from bench.suite.output import stand_beside
 
     request = asked.RunRequest(
-        data=_data_options(data or ["procedural"]),
+        data=datasets_of(data or ["procedural"]),
         overrides=overrides_of(unit, up, fps),
         out=out or asked.default_out(RUNS),
         store=store,
-        methods=_names(methods),
+        methods=names_of(methods),
         adapter_files=tuple(adapter or ()),
         only_files=bool(against and adapter),
-        tracks=_names(tracks) or (() if protocols else ("transfer",)),
-        protocols=_names(protocols),
+        tracks=names_of(tracks) or (() if protocols else ("transfer",)),
+        protocols=names_of(protocols),
         profile=profile,
         jobs=jobs,
         scheduler=scheduler,
         keep_failures=keep_failures,
-        seeds=_seeds(seeds),
+        seeds=seeds_of(seeds),
         budget=budget,
         device=device,
         split=split,
@@ -157,8 +154,8 @@ def fit(
     from bench.suite.fitting import FitOrder, fit_all, table_of
 
     order = FitOrder(
-        data=_data_options(data or ["procedural"]), methods=_names(methods), adapter_files=tuple(adapter or ()),
-        budget=budget, seeds=_seeds(seeds), device=device, split=split, jobs=jobs, out=out, store=store,
+        data=datasets_of(data or ["procedural"]), methods=names_of(methods), adapter_files=tuple(adapter or ()),
+        budget=budget, seeds=seeds_of(seeds), device=device, split=split, jobs=jobs, out=out, store=store,
         command=shlex.join(["stylebench", *sys.argv[1:]]),
     )  # fmt: skip
     with console.ProgressDisplay() as progress:
@@ -210,7 +207,7 @@ def check(
         raise BadConfig(f"no file {file}", remedy="give FILE.py, FILE.py:Class, FOLDER/adapter.toml or a folder")
     if folder.is_dir():
         with console.ProgressDisplay() as progress:
-            rows = list(check_submission(folder, exported_setting(folder, _data(data), store, progress)))
+            rows = list(check_submission(folder, exported_setting(folder, data_of(data), store, progress)))
     else:
         rows = list(check_option(target, log=log))
     if as_json:
@@ -246,9 +243,9 @@ def export_tasks(
     """
     from bench.suite import submission, submit
 
-    traits = submit.traits_of_labels(_names(labels))
+    traits = submit.traits_of_labels(names_of(labels))
     with console.ProgressDisplay() as progress:
-        setting = submit.setting_of(_data(data, overrides_of(unit, up, fps)), protocol, profile, store, progress)
+        setting = submit.setting_of(data_of(data, overrides_of(unit, up, fps)), protocol, profile, store, progress)
         path = submission.export_tasks(
             setting, out, traits=traits, motions=motions, with_fit=with_fit,
             progress=lambda what, done, total: progress("data", what, done, total),
@@ -285,7 +282,7 @@ def score(
         command=shlex.join(["stylebench", *sys.argv[1:]]),
     )
     with console.ProgressDisplay() as progress:
-        setting = submit.exported_setting(folder, _data(data, overrides_of(unit, up, fps)), store, progress)
+        setting = submit.exported_setting(folder, data_of(data, overrides_of(unit, up, fps)), store, progress)
         record = submit.score_submission(folder, setting, request, progress)
     if out is None:
         asked.latest_link(request.out)
@@ -355,78 +352,8 @@ def leaderboard(
     console.say(f"wrote {path}")
 
 
-@app.command()
-def ladder(
-    data: Annotated[
-        list[str] | None, typer.Option(help="Measure this dataset, NAME or NAME=PATH; default: use stored numbers.")
-    ] = None,
-    samples: Annotated[int, typer.Option(min=130, help="Windows a level.")] = 200,
-    check: Annotated[bool, typer.Option("--check", help="Only compare; exit 1 on a difference.")] = False,
-    numbers: Annotated[Path, typer.Option(help="Folder of stored numbers.")] = Path("reports/published/ladder"),
-    docs: Annotated[Path, typer.Option(help="Folder of the page and its figure.")] = Path("docs/metrics"),
-    store: Annotated[Path, typer.Option(help="Where finished work is kept between runs.")] = STORE,
-) -> None:
-    """Corrupt real motion step by step and see what every metric makes of it.
-
-    Example: stylebench ladder --data procedural
-    """
-    from bench.datasets.table import load_dataset
-    from bench.suite.ladder import page
-    from bench.suite.ladder.climb import measured
-    from bench.suite.store import Store
-    from reports.ladder import write_rungs
-
-    with console.ProgressDisplay() as progress:
-        for name, path in _data_options(data or []).items():
-            dataset = load_dataset(name, path, lambda what, done, total: progress("data", what, done, total))
-            write_rungs(numbers / f"{name}.csv", measured(dataset, samples, Store(store), progress))
-    stored = page.stored_rungs(numbers)
-    wrong = page.contradictions(page.all_cells(stored))
-    for line in wrong:
-        console.complain(line)
-    if check:
-        changed = page.difference(docs, stored)
-        if changed:
-            console.say(changed)
-        if changed or wrong:
-            raise typer.Exit(1)
-        return
-    for path in page.write_page(docs, stored):
-        console.say(f"wrote {path}")
-    if wrong:
-        raise typer.Exit(1)
-
-
-@app.command()
-def trust(
-    run_folders: Annotated[list[Path] | None, typer.Argument(help="Run folders of the transfer track.")] = None,
-    data: Annotated[list[str] | None, typer.Option(help="Dataset as NAME or NAME=PATH; default: procedural.")] = None,
-    store: Annotated[Path, typer.Option(help="The store of those runs; it has their motions.")] = STORE,
-    check: Annotated[bool, typer.Option("--check", help="Only compare; exit 1 on a difference.")] = False,
-    numbers: Annotated[Path, typer.Option(help="Folder of stored numbers.")] = Path("reports/published_trust"),
-    page: Annotated[Path, typer.Option(help="The page; its figure lies beside it.")] = Path("docs/trust.md"),
-    cards: Annotated[bool, typer.Option("--cards", help="Also note the agreement on the judges' cards.")] = False,
-) -> None:
-    """Judge stored motions with a second judge family and write docs/trust.md; without run folders from stored numbers.
-
-    Example: stylebench trust runs/latest --data bandai-namco=bandai.zip
-    """
-    from bench.suite import trust as measured
-    from reports.trust_page import check_page, write_page
-
-    if check:
-        difference = check_page(page, numbers)
-        if difference:
-            console.say(difference)
-            raise typer.Exit(1)
-        return
-    if run_folders:
-        with console.ProgressDisplay() as progress:
-            found = measured.measure(run_folders, _data_options(data or ["procedural"]), store, progress)
-        measured.publish(found, numbers, page, cards=cards)
-    else:
-        write_page(numbers, page)
-    console.say(f"wrote {page}")
+app.command()(ladder)
+app.command()(trust)
 
 
 @app.command()
@@ -444,36 +371,6 @@ def clean(
     if target.is_dir():
         shutil.rmtree(target)
     console.say(f"removed {target}")
-
-
-def _names(option: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in option.split(",") if name.strip())
-
-
-def _seeds(option: str) -> tuple[int, ...]:
-    names = _names(option)
-    if not all(name.isdecimal() for name in names):
-        raise BadConfig(
-            f"expected numbers from 0 on, got {option!r}", where="--seeds", remedy="for example --seeds 0,1,2"
-        )
-    return tuple(int(name) for name in names)
-
-
-def _data(option: str, overrides: Overrides | None = None) -> Data:
-    from bench.suite.submit import Data
-
-    [(name, path)] = _data_options([option]).items()
-    return Data(name, path, overrides)
-
-
-def _data_options(options: list[str]) -> dict[str, Path | None]:
-    found: dict[str, Path | None] = {}
-    for option in options:
-        name, has_path, path = option.partition("=")
-        if name in found:
-            raise BadConfig(f"dataset {name!r} is given twice", where="--data")
-        found[name] = Path(path).expanduser() if has_path else None
-    return found
 
 
 def _print_plan(request: RunRequest, as_json: bool) -> None:
