@@ -229,8 +229,8 @@ class Film(StyleModulation):
     def __init__(self, size: ModelSize) -> None:
         super().__init__()
         self.generator = nn.Sequential(
-            nn.Conv1d(size.clip_features, CLIP_CHANNELS, CLIP_KERNEL, padding=CLIP_KERNEL // 2), nn.ReLU(), nn.MaxPool1d(2),
-            nn.Conv1d(CLIP_CHANNELS, CLIP_CHANNELS, CLIP_KERNEL, padding=CLIP_KERNEL // 2), nn.ReLU(), nn.MaxPool1d(2),
+            _convolution(size.clip_features), nn.ReLU(), nn.MaxPool1d(2),
+            _convolution(CLIP_CHANNELS), nn.ReLU(), nn.MaxPool1d(2),
             nn.Flatten(),
             nn.Dropout(size.dropout),
             nn.Linear(CLIP_CHANNELS * (size.clip_frames // 4), size.film_hidden), nn.ReLU(),
@@ -250,6 +250,10 @@ class Film(StyleModulation):
     def second(self, features: Tensor, below: Tensor, code: Tensor, blend: Tensor) -> Tensor:
         _, _, gamma, beta = code.chunk(4, dim=1)
         return functional.elu(gamma * layer_norm(features) + beta)
+
+
+def _convolution(n_in: int) -> nn.Conv1d:
+    return nn.Conv1d(n_in, CLIP_CHANNELS, CLIP_KERNEL, padding=CLIP_KERNEL // 2)
 
 
 def layer_norm(features: Tensor) -> Tensor:
