@@ -26,7 +26,6 @@ GATE_WIDTH = 32
 N_PHASES = 8
 N_GATE_VELOCITIES = 12
 NORM_EPSILON = 1e-6
-CLIP_CHANNELS = 256
 CLIP_KERNEL = 25
 
 
@@ -41,6 +40,7 @@ class ModelSize:
     n_styles : styles that the one-hot input and the residual adapters tell apart.
     hidden : both hidden layers.
     clip_frames, clip_features : of the style clip that FiLM parameters are read from.
+    clip_channels : of both convolutions over it.
     film_hidden : first fully connected layer of the FiLM generator.
     rank : of PFNN's residual adapters.
     dropout : in front of every layer of synthesis, gating and FiLM networks.
@@ -54,6 +54,7 @@ class ModelSize:
     hidden: int = 512
     clip_frames: int = 240
     clip_features: int = 300
+    clip_channels: int = 256
     film_hidden: int = 2048
     rank: int = 30
     dropout: float = 0.3
@@ -229,11 +230,11 @@ class Film(StyleModulation):
     def __init__(self, size: ModelSize) -> None:
         super().__init__()
         self.generator = nn.Sequential(
-            _convolution(size.clip_features), nn.ReLU(), nn.MaxPool1d(2),
-            _convolution(CLIP_CHANNELS), nn.ReLU(), nn.MaxPool1d(2),
+            _convolution(size.clip_features, size.clip_channels), nn.ReLU(), nn.MaxPool1d(2),
+            _convolution(size.clip_channels, size.clip_channels), nn.ReLU(), nn.MaxPool1d(2),
             nn.Flatten(),
             nn.Dropout(size.dropout),
-            nn.Linear(CLIP_CHANNELS * (size.clip_frames // 4), size.film_hidden), nn.ReLU(),
+            nn.Linear(size.clip_channels * (size.clip_frames // 4), size.film_hidden), nn.ReLU(),
             nn.Dropout(size.dropout),
             nn.Linear(size.film_hidden, 4 * size.hidden),
         )  # fmt: skip
@@ -252,8 +253,8 @@ class Film(StyleModulation):
         return functional.elu(gamma * layer_norm(features) + beta)
 
 
-def _convolution(n_in: int) -> nn.Conv1d:
-    return nn.Conv1d(n_in, CLIP_CHANNELS, CLIP_KERNEL, padding=CLIP_KERNEL // 2)
+def _convolution(n_in: int, n_out: int) -> nn.Conv1d:
+    return nn.Conv1d(n_in, n_out, CLIP_KERNEL, padding=CLIP_KERNEL // 2)
 
 
 def layer_norm(features: Tensor) -> Tensor:
