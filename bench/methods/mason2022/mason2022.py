@@ -135,7 +135,8 @@ def l_bll(true_pose: Tensor, predicted_pose: Tensor) -> Tensor:
 def _bone_lengths_m(pose: Tensor) -> Tensor:
     positions = pose.view(len(pose), -1, PER_JOINT)[..., :3]
     child, parent = list(BONES), [CANONICAL_PARENTS[joint] for joint in BONES]
-    return (positions[:, child] - positions[:, parent]).norm(dim=-1)
+    lengths: Tensor = torch.linalg.vector_norm(positions[:, child] - positions[:, parent], dim=-1)
+    return lengths
 
 
 class MasonTraining(Trainable):
