@@ -20,6 +20,7 @@ from bench.adapters.anchors import (
 from bench.adapters.base import Adapter
 from bench.adapters.fitted_anchors import ClassifyAndRetrieve, MeanPose, NearestPose, StyleMeanShift
 from bench.adapters.gesture_oracles import GESTURE_ORACLES
+from bench.adapters.mason2022 import MASON_2022
 from bench.adapters.oracles import LabelOracle, ProceduralTruth, RealDisjoint, RealTest
 
 _TABLE: tuple[type[Adapter], ...] = (
@@ -46,6 +47,7 @@ _TABLE: tuple[type[Adapter], ...] = (
     *GESTURE_ORACLES,
     Aberman2020,
     Aberman2020Content,
+    *MASON_2022,
 )
 ADAPTERS: dict[str, type[Adapter]] = {adapter.name: adapter for adapter in _TABLE}
 """Name -> adapter class. The order is the order of rows that tie."""

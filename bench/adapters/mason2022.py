@@ -10,12 +10,9 @@ from bench.adapters.base import Stream, Traits
 from bench.adapters.learned import LearnedAdapter
 from bench.arrays import FloatArray
 from bench.datasets.take import Take
-from bench.errors import BadInput
 from bench.motion.clip import Clip
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from bench.methods.mason2022.mason2022 import MasonConfig, MasonNetwork
     from bench.methods.training import Curves, FitRequest
 
@@ -44,32 +41,19 @@ class _Mason2022(LearnedAdapter["MasonConfig", "MasonNetwork"]):
         return train_mason(config_of(self.model, request.budget), request)
 
     def predict(self, past: Clip, style: Take, trajectory_xz_m: FloatArray) -> Clip:
-        from bench.methods.mason2022.streaming import predict
+        from bench.methods.mason2022.streaming import code_of, predict
 
-        return predict(self.network, self._code(style), past, trajectory_xz_m)
+        return predict(self.network, code_of(self.network, style), past, trajectory_xz_m)
 
     def open_stream(self, style: Take, *, content_label: str | None, rng: np.random.Generator) -> Stream:
-        from bench.methods.mason2022.streaming import FollowingStream
+        from bench.methods.mason2022.streaming import FollowingStream, code_of
 
-        return FollowingStream(self.network, self._code(style), style.clip.skeleton, style.clip.fps)
+        return FollowingStream(self.network, code_of(self.network, style), style.clip.skeleton, style.clip.fps)
 
     def bytes_per_style(self) -> int:
         from bench.methods.mason2022.network import numbers_per_style
 
         return 4 * numbers_per_style(self.config.size)
-
-    def _code(self, style: Take) -> Tensor:
-        from bench.methods.mason2022.rollout import style_code
-
-        if not self.traits.needs_style_label:
-            return style_code(self.network, style.clip)
-        if style.style not in self.config.styles:
-            raise BadInput(
-                f"{self.name} knows the styles {', '.join(self.config.styles)}, got {style.style!r}",
-                where="style",
-                cause="it tells styles by label, and this one was not trained",
-            )
-        return style_code(self.network, None, {style.style: 1.0})
 
 
 class PfnnOneHot(_Mason2022):

@@ -6,9 +6,11 @@ import numpy as np
 from torch import Tensor
 
 from bench.arrays import FloatArray
+from bench.datasets.take import Take
+from bench.errors import BadInput
 from bench.methods.mason2022.features import FPS, local_rotations
 from bench.methods.mason2022.mason2022 import MasonNetwork
-from bench.methods.mason2022.rollout import AHEAD_FRAMES, Pose, Rollout
+from bench.methods.mason2022.rollout import AHEAD_FRAMES, Pose, Rollout, style_code
 from bench.motion import quat
 from bench.motion.clip import Clip
 from bench.motion.edit import resample
@@ -19,6 +21,25 @@ WALKS_M_S = 0.2
 """From this speed on a path has a direction that the body's facing follows."""
 VELOCITY_S = 0.25
 """A source's velocity is taken over this long."""
+
+
+def code_of(network: MasonNetwork, style: Take) -> Tensor:
+    """The code of a style: read off the take's clip by FiLM, known by the take's label otherwise.
+
+    Raises
+    ------
+    BadInput : a label that was not trained.
+    """
+    config = network.config
+    if config.modulation == "film":
+        return style_code(network, style.clip)
+    if style.style not in config.styles:
+        raise BadInput(
+            f"the model knows the styles {', '.join(config.styles)}, got {style.style!r}",
+            where="style",
+            cause="it tells styles by label, and this one was not trained",
+        )
+    return style_code(network, None, {style.style: 1.0})
 
 
 def predict(network: MasonNetwork, code: Tensor, past: Clip, path_xz_m: FloatArray) -> Clip:
