@@ -45,8 +45,10 @@ class Cell:
     ----------
     claim : what was declared: ``up``, ``down``, ``ignore``, ``blind`` or ``open``.
     observed : ``up``, ``down``, ``flat``, ``mixed`` or ``undefined``.
-    change : from real motion to the last level, over the widest change that any ladder brings about in the metric.
-    worsening : the same change towards the worse; negative where the corruption looks better.
+    change : from real motion to the last level, as a share of the metric's range: of the widest change that any ladder
+        brings about, on the scale of ``bench.suite.ladder.verdict.Range``.
+    worsening : the same change towards the worse; negative where the corruption looks better, 0 for metrics without a
+        good direction.
     contradiction : how the two disagree; empty where they do not.
     """
 

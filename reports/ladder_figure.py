@@ -19,9 +19,10 @@ INK_ON_DARK_FROM = 0.6
 
 
 def ladder_figure(panels: Mapping[str, Sequence[Cell]]) -> Figure:
-    """Colour: worse (orange) or better (purple) at the last level, over the widest change of that metric.
+    """Colour: worse (orange) or better (purple) at the last level, as a share of the metric's range.
 
-    Signs say which way the number goes. A grey frame marks a declared blind spot, a black one a contradiction.
+    Signs say which way the number goes; metrics without a good direction have signs only. A grey frame marks a declared
+    blind spot, a black one a contradiction.
     """
     metrics = list(dict.fromkeys(cell.metric for cells in panels.values() for cell in cells))
     ladders = list(dict.fromkeys(cell.ladder for cells in panels.values() for cell in cells))
@@ -36,7 +37,7 @@ def ladder_figure(panels: Mapping[str, Sequence[Cell]]) -> Figure:
         ]
         grid[0].set_yticks(range(len(metrics)), metrics, fontsize=7.5)
         bar = figure.colorbar(drawn[-1], ax=list(grid), shrink=0.4, pad=0.01, aspect=30)
-        bar.set_label("at the last level: better (−) or worse (+), share of the metric's widest change")
+        bar.set_label("at the last level: better (−) or worse (+), share of the metric's range")
         figure.suptitle("What metrics make of corrupted real motion", x=0.01, ha="left", fontweight="bold")
         figure.supxlabel(
             "▲ rises  ▼ falls  · stays  ~ neither  – undefined    grey frame: declared blind spot    "

@@ -114,7 +114,7 @@ LADDERS: dict[str, Ladder] = {
         Ladder("label shuffle", "labels handed round among the samples, motion untouched", "share", (0.25, 0.5, 1.0),
                _labels_shuffled),
         Ladder("frozen frames", "the pose held before and after the middle of the window", "share",
-               (0.25, 0.5, 0.75, 1.0), _clip_by_clip(corrupt.frozen)),
+               (0.5, 0.75, 1.0), _clip_by_clip(corrupt.frozen)),
         Ladder("dropped frames", "frames lost, the one before shown instead", "share", (0.1, 0.3, 0.6),
                _at_random(corrupt.frames_dropped)),
         Ladder("look-up", "replaced by training motion with the right labels", "share", (0.25, 0.5, 1.0), _looked_up),
