@@ -210,6 +210,13 @@ COLUMNS: dict[str, tuple[ColumnChoice, ...]] = {
         ColumnChoice("cra_balanced", "CRA balanced", slices=("all",)),
         ColumnChoice("sra_balanced", "SRA balanced", slices=("all",)),
     ),
+    "mason2022/rollout": (
+        ColumnChoice("sra", "SRA", slices=("all",), interval=True),
+        ColumnChoice("cra", "CRA", slices=("all",)),
+        ColumnChoice("path_drift", "drift", slices=("all",)),
+        ColumnChoice("foot_skate", "foot skate", slices=("all",)),
+        ColumnChoice("jerk_ratio", "jerk ratio", slices=("all",)),
+    ),
     "style_erd/table1": _ERD,
     "style_erd/table1-neutral": _ERD,
 }

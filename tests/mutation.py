@@ -86,6 +86,7 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     "reconstruction_position": ("paired:position_errors_cm",),
     "reconstruction_rotation": ("paired:rotation_errors_deg",),
     "join_jerk_ratio": ("physics:jerk_per_sample",),
+    "path_drift": ("physics:path_drift",),
     "prefix_error": ("paired:position_errors_cm",),
     "paired_position": ("paired:paired_errors.position_cm",),
     "paired_rotation": ("paired:paired_errors.rotation_deg",),

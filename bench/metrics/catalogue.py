@@ -155,6 +155,8 @@ CONDITION_METRICS: tuple[Metric, ...] = (
            "a copy of the source is perfect", "paired"),
     Metric("join_jerk_ratio", 1, "1", "one", "output over source of jerk at joins divided by jerk elsewhere", OURS,
            "trembling everywhere hides jumps at joins", "physics"),
+    Metric("path_drift", 1, "cm", "lower", "ground distance of output and source at the end of a stretch", OURS,
+           "a body that only slides along its source's path does not drift", "physics"),
     Metric("prefix_error", 1, "cm", "lower", "joint distance of the answer to a prefix from the full answer", OURS,
            "a method that ignores its input is perfect", "paired"),
     Metric("paired_position", 1, "cm", "lower", "joint distance to the true answer, frame by frame", OURS,

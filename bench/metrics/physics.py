@@ -175,6 +175,22 @@ def root_path_error(source_root_xyz_m: ArrayLike, output_root_xyz_m: ArrayLike) 
     return np.asarray(100.0 * np.abs(wanted - turned).mean(axis=1))
 
 
+def path_drift(source_root_xyz_m: ArrayLike, output_root_xyz_m: ArrayLike) -> FloatArray:
+    """Horizontal distance of the output's root from its source's in the last frame: ``[n]`` cm, nothing aligned.
+
+    Parameters
+    ----------
+    source_root_xyz_m, output_root_xyz_m : ``[n, T, 3]``, metres.
+
+    Raises
+    ------
+    BadInput : shapes that differ, NaN.
+    """
+    source = finite_array(source_root_xyz_m, "source_root_xyz_m", (None, None, 3))
+    output = finite_array(output_root_xyz_m, "output_root_xyz_m", source.shape)
+    return np.asarray(100.0 * np.linalg.norm((output - source)[:, -1, [0, 2]], axis=-1))
+
+
 def _mean_length_of_differences(positions: FloatArray, fps: float, *, order: int) -> FloatArray:
     """Per sample, so that no array of all differences is held at once."""
     return np.array(

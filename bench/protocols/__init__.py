@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.protocols import kuriyama2022, motion_puzzle, park2021, style_erd
+from bench.protocols import kuriyama2022, mason2022, motion_puzzle, park2021, style_erd
 from bench.protocols.base import Protocol
 from bench.protocols.conditions import FOREIGN, LONG, SELF, SHORT
 from bench.protocols.gesture import GESTURE
@@ -42,6 +42,9 @@ PROTOCOLS: dict[str, Protocol] = {
         kuriyama2022.TABLE_2,
         kuriyama2022.TABLE_3,
         kuriyama2022.TABLE_4,
+        mason2022.TABLE_2,
+        mason2022.FIG_10,
+        mason2022.ROLLOUT,
     )
 }
 """``name@version`` or ``name@version/condition`` -> protocol."""

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from bench.datasets.base import Dataset
 from bench.datasets.joined import joined_take, piece_ids
 from bench.datasets.take import Take
 from bench.errors import BadData
+from bench.motion.clip import Clip
 from bench.motion.edit import crop
 from bench.protocols.base import Task, TaskPool, pick
 from bench.protocols.transfer import TRANSFER, WINDOW_FRAMES, draw_tasks, make_tasks
@@ -77,14 +78,16 @@ def _sequence(number: int, style: str, by_style: Mapping[str, list[Take]], rng: 
     return sequence.with_clip(crop(sequence.clip, 0, n_frames))
 
 
-def long_tasks(pool: TaskPool, n: int, seed: int) -> list[Task]:
-    """One task a joined sequence, with the judged content of each piece; styles are references of the test part."""
+def long_tasks(
+    pool: TaskPool, n: int, seed: int, *, references: Callable[[Clip], bool] = lambda clip: True
+) -> list[Task]:
+    """One task a joined sequence, with the judged content of each piece; styles are takes that ``references`` lets."""
     by_id = {take.take_id: take for take in pool.takes}
     rng = np.random.default_rng(seed)
     tasks = []
     for index, sequence in enumerate(pool.extra[:n]):
-        references = [take for take in pool.takes if take.style != sequence.style]
-        reference = pick(references, rng)
+        others = [take for take in pool.takes if take.style != sequence.style and references(take.clip)]
+        reference = pick(others, rng)
         pieces = [by_id[take_id] for take_id in piece_ids(sequence.take_id)]
         starts = np.cumsum([0, *(piece.clip.n_frames for piece in pieces[:-1])])
         tasks.append(

@@ -9,12 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from bench.datasets.take import Take
 from bench.errors import BadData
 from bench.protocols.base import Protocol, Task, TaskPool
 from bench.protocols.transfer import make_tasks
 
-PAST_FRAMES = 30
-"""Frames of past and of trajectory ahead: one second, as in Mason 2022, section 4.1."""
+PAST_S = 1.0
+"""Past and trajectory ahead, seconds (Mason 2022, section 4.1)."""
 
 
 def prediction_tasks(pool: TaskPool, n: int, seed: int) -> list[Task]:
@@ -26,20 +27,21 @@ def prediction_tasks(pool: TaskPool, n: int, seed: int) -> list[Task]:
     ------
     BadData : no take is longer than two seconds.
     """
-    usable = [take for take in pool.takes if take.clip.n_frames > 2 * PAST_FRAMES]
+    usable = [take for take in pool.takes if take.clip.n_frames > 2 * _second(take)]
     if not usable:
-        raise BadData(f"prediction needs takes of more than {2 * PAST_FRAMES} frames, there is none")
+        raise BadData(f"prediction needs takes of more than {2 * PAST_S:g} s, there is none")
     by_id = {take.take_id: take for take in usable}
     rng = np.random.default_rng([seed, 2])
     tasks = []
     for task in make_tasks(TaskPool(usable), n, seed):
         take = by_id[task.content_take_id]
+        n_past = _second(take)
         others = [t for t in pool.takes if t.style == take.style and t.take_id != take.take_id]
         reference = others[int(rng.integers(len(others)))] if others else take
         tasks.append(
             replace(
                 task,
-                start_frame=int(rng.integers(PAST_FRAMES, take.clip.n_frames - PAST_FRAMES)),
+                start_frame=int(rng.integers(n_past, take.clip.n_frames - n_past)),
                 n_frames=1,
                 style_take_id=reference.take_id,
                 target_style=str(take.style),
@@ -47,6 +49,10 @@ def prediction_tasks(pool: TaskPool, n: int, seed: int) -> list[Task]:
             )
         )
     return tasks
+
+
+def _second(take: Take) -> int:
+    return round(PAST_S * take.clip.fps)
 
 
 PREDICTION = Protocol(

@@ -17,7 +17,7 @@ from bench.datasets.take import Take
 from bench.motion.clip import Clip
 from bench.motion.edit import crop, resample, window
 from bench.protocols.base import Task
-from bench.protocols.prediction import PAST_FRAMES
+from bench.protocols.prediction import PAST_S
 
 Answer = Callable[[Task], Take]
 """From a task to the answer, with the labels under which it is scored."""
@@ -91,7 +91,10 @@ class _FromContent(_Asked, ABC):
 
 class _Transfer(_FromContent):
     def _call(self, task: Task, content: Take) -> Clip:
-        return self.adapter.transfer(content, self._style(task.style_take_id), rng=_rng(task))
+        style = self._style(task.style_take_id)
+        if "transfers" not in self.adapter.capabilities():
+            return _streamed(self.adapter, content, style, rng=_rng(task))
+        return self.adapter.transfer(content, style, rng=_rng(task))
 
 
 class _Sample(_FromContent):
@@ -120,8 +123,9 @@ class _Predict(_Asked):
 
     def __call__(self, task: Task) -> Take:
         take = self.pack.take(task.content_take_id)
-        past = crop(take.clip, task.start_frame - PAST_FRAMES, PAST_FRAMES)
-        path = take.clip.root_xyz_m[task.start_frame : task.start_frame + PAST_FRAMES, [0, 2]]
+        n_past = round(PAST_S * take.clip.fps)
+        past = crop(take.clip, task.start_frame - n_past, n_past)
+        path = take.clip.root_xyz_m[task.start_frame : task.start_frame + n_past, [0, 2]]
         clip = self.adapter.predict(past, self._style(task.style_take_id), path)
         frame = crop(take.clip, task.start_frame, 1)
         answer = checked_answer(clip, frame, task.sample_id, own_bones=True)
@@ -145,6 +149,14 @@ def source_of(task: Task, pack: Pack, fps: float) -> Take:
     if task.n_frames:
         return take.with_clip(window(take.clip, task.start_frame, task.n_frames))
     return take.with_clip(resample(take.clip, fps))
+
+
+def _streamed(adapter: Adapter, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
+    """The answer of an adapter that only streams: the content's frames one after the other."""
+    at_rate = style.with_clip(resample(style.clip, content.clip.fps))
+    stream = adapter.open_stream(at_rate, content_label=content.content, rng=rng)
+    frames = [stream.step(*frame) for frame in zip(content.clip.rotations_wxyz, content.clip.root_xyz_m, strict=True)]
+    return content.clip.with_motion(np.stack([f[0] for f in frames]), np.stack([f[1] for f in frames]))
 
 
 def _rng(task: Task) -> np.random.Generator:

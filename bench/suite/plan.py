@@ -107,7 +107,9 @@ def _unsupported(adapter: type[Adapter], setting: Setting) -> str:
         if adapter.needs_truth and setting.dataset.name != KNOWN_FOR:
             return f"true answers exist for the {KNOWN_FOR} dataset only"
         # Conditions of our own protocols ask for something else than the track; those of papers are tables of theirs.
-        special = protocol.name == f"stylebench-{protocol.track}" and protocol.condition != "standard"
+        # No oracle walks along a path frame by frame.
+        own = protocol.name == f"stylebench-{protocol.track}" and protocol.condition != "standard"
+        special = own or protocol.needs == "streams"
         if (f"{protocol.track}/{protocol.condition}" if special else protocol.track) not in adapter.tracks:
             return f"means nothing in {protocol.label}"
     elif protocol.needs not in adapter.capabilities():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from bench.metrics.runtime import DEADLINE_FPS
@@ -57,7 +58,7 @@ def time_cells(session: Session, setting: Setting, cells: Sequence[Cell], record
     made = made_here(session.request.command, session.request.limits.threads, {})
     if jobs:
         name = f"timing {len(jobs)} methods for {setting.protocol.label} on {setting.dataset.dataset_id}"
-        [answer] = session.answers([_timing_call(session, jobs)], name)
+        [answer] = session.answers([_timing_call(session, setting, jobs)], name)
         results |= answer.results
         made = answer.made
     records = []
@@ -92,13 +93,13 @@ def _unfitted(session: Session, setting: Setting, cells: Sequence[Cell]) -> dict
     return {key: outcome for key, outcome in ended.items() if outcome.status != "ok"}
 
 
-def _timing_call(session: Session, jobs: Sequence[TimingJob]) -> TimingCall:
+def _timing_call(session: Session, setting: Setting, jobs: Sequence[TimingJob]) -> TimingCall:
     return TimingCall(
         name=f"timing-{jobs[0].key}",
         folder=str(session.folder),
         wanted=session.wanted,
         jobs=tuple(jobs),
-        plan=PLANS[session.request.profile],
+        plan=replace(PLANS[session.request.profile], fps=setting.protocol.fps),
         limits=session.request.limits,
         logs=session.logs,
         command=session.request.command,

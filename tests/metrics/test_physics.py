@@ -12,6 +12,7 @@ from bench.errors import BadInput
 from bench.metrics.physics import (
     bone_drift,
     jerk_per_sample,
+    path_drift,
     ratio_per_content,
     ratio_to_reference,
     root_path_error,
@@ -319,3 +320,32 @@ def test_root_path_error_refuses_what_does_not_fit() -> None:
         root_path_error(good, good[:, 1:])
     with pytest.raises(BadInput, match="output_root_xyz_m must be finite"):
         root_path_error(good, good * np.nan)
+
+
+class TestPathDrift:
+    def test_by_hand_and_perfect(self) -> None:
+        source = np.zeros((2, 3, 3))
+        output = source.copy()
+        output[1, -1] = [0.03, 5.0, -0.04]
+        assert path_drift(source, source).tolist() == [0.0, 0.0]
+        assert path_drift(source, output) == pytest.approx([0.0, 5.0])
+
+    def test_only_the_end_counts_and_nothing_is_aligned(self) -> None:
+        rng = np.random.default_rng(0)
+        source = rng.normal(size=(1, 5, 3))
+        output = source.copy()
+        output[:, :-1] += 1.0
+        assert path_drift(source, output) == pytest.approx([0.0])
+        assert path_drift(source, source + np.array([0.0, 2.0, 1.0])) == pytest.approx([100.0])
+        assert path_drift(source, output) == pytest.approx(path_drift(output, source))
+
+    def test_grows_with_the_fault_and_not_with_where_it_happens(self) -> None:
+        source = np.zeros((1, 4, 3))
+        drifts = [float(path_drift(source + 7.0, source + 7.0 + d * np.array([1.0, 0.0, 1.0]))[0]) for d in range(4)]
+        assert drifts == sorted(drifts) and drifts[-1] == pytest.approx(300.0 * np.sqrt(2.0))
+
+    def test_refuses_other_shapes_and_nan(self) -> None:
+        with pytest.raises(BadInput, match="output_root_xyz_m must have shape"):
+            path_drift(np.zeros((1, 4, 3)), np.zeros((1, 3, 3)))
+        with pytest.raises(BadInput, match="source_root_xyz_m must be finite"):
+            path_drift(np.full((1, 4, 3), np.nan), np.zeros((1, 4, 3)))

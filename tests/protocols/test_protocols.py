@@ -152,7 +152,7 @@ def test_prediction_has_a_second_on_both_sides(toy: Dataset) -> None:
 
 def test_prediction_refuses_short_takes(toy: Dataset) -> None:
     short = [replace(take, clip=random_clip(50, seed=1)) for take in toy.takes[:40]]
-    with pytest.raises(BadData, match="more than 60 frames"):
+    with pytest.raises(BadData, match="more than 2 s"):
         PROTOCOLS["stylebench-prediction@1"].make_tasks(TaskPool(short), 4, 0)
 
 

@@ -60,6 +60,7 @@ SCORES: dict[str, AnyScore[Any, Any]] = {
     "reconstruction_position": conditions.reconstruction_position,
     "reconstruction_rotation": conditions.reconstruction_rotation,
     "join_jerk_ratio": conditions.join_jerk_ratio,
+    "path_drift": conditions.path_drift,
     "prefix_error": conditions.prefix_error,
     "fmd[stgcn]": papers.fmd_stgcn,
     **{name: partial(papers.fmd_dae_512, name) for name in papers.CUT_OF},

@@ -136,6 +136,12 @@ def segments_of(task: Task, n_frames: int) -> list[Task]:
     ]
 
 
+def path_drift(row: Row, reference: Reference) -> Scored:
+    """Ground distance of output and source at the end of each judged stretch."""
+    values = physics.path_drift(row.source_positions_m[:, :, 0], row.positions_m[:, :, 0])
+    return mean_score("path_drift", values, reference, slices=("all",))
+
+
 def join_jerk_ratio(row: SegmentRow, reference: Reference) -> Scored:
     """Jerk around joins over jerk inside segments, output over source."""
     ratios = []
