@@ -32,7 +32,7 @@ class Sinusoids:
     Attributes
     ----------
     phase : ``[T]`` cycles in [0, 1), at the frame itself.
-    frequency_hz, amplitude, offset : ``[T]``; amplitudes are not negative.
+    frequency_hz, amplitude, offset : ``[T]``; amplitudes lie between 0 and the range of the source in the window.
     error : ``[T]`` mean squared residual over the window.
     """
 
@@ -96,26 +96,25 @@ def fit_sinusoids(source: FloatArray, fps: float) -> Sinusoids:
     """The sine of least squared error within one second around each frame of ``[T]``.
 
     For a given frequency the best sine is a linear regression on sine, cosine and 1, so only the frequency is searched:
-    on a grid over 1/4 to 4 Hz, then finely around the best. Starke et al. search all four numbers by evolution; the
-    result here is never worse.
+    on a grid over 1/4 to 4 Hz, then finely around the best. A sine may not be larger than the range of what it is
+    fitted to, else a slow one of which only the crest is seen would be. Starke et al. search all four numbers by
+    evolution; the result here is never worse.
     """
     n = _half(fps)
     around = sliding_window_view(np.pad(source, n, mode="reflect", reflect_type="even"), 2 * n + 1)
     times_s = np.arange(-n, n + 1) / fps
     coarse = np.arange(LEAST_HZ, MOST_HZ + 1e-9, GRID_HZ)
-    best = coarse[np.argmin([_residuals(around, times_s, f) for f in coarse], axis=0)]
+    best = coarse[np.argmin([_fit(around, times_s, frequency)[1] for frequency in coarse], axis=0)]
     lowest = np.full(len(source), np.inf)
     result = np.zeros((4, len(source)))
     for step in np.arange(-GRID_HZ, GRID_HZ + 1e-9, REFINED_HZ):
         for centre in np.unique(best):
             frequency = float(np.clip(centre + step, LEAST_HZ, MOST_HZ))
             rows = np.flatnonzero(best == centre)
-            design = _design(times_s, frequency)
-            found, *_ = np.linalg.lstsq(design, around[rows].T, rcond=None)
-            error = ((design @ found - around[rows].T) ** 2).mean(axis=0)
+            found, error = _fit(around[rows], times_s, frequency)
             better = error < lowest[rows]
             lowest[rows[better]] = error[better]
-            result[:3, rows[better]] = found[:, better]
+            result[:3, rows[better]] = found[better].T
             result[3, rows[better]] = frequency
     of_sine, of_cosine, offset, frequency_hz = result
     phase = np.arctan2(of_cosine, of_sine) / (2.0 * np.pi) % 1.0
@@ -183,11 +182,14 @@ def _half(fps: float) -> int:
     return max(2, round(0.5 * WINDOW_S * fps))
 
 
-def _design(times_s: FloatArray, frequency_hz: float) -> FloatArray:
+def _fit(around: FloatArray, times_s: FloatArray, frequency_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Of windows ``[n, W]``: factors ``[n, 3]`` of sine, cosine and 1, and mean squared residuals ``[n]``.
+
+    Residuals of sines that are too large are infinite.
+    """
     angle = 2.0 * np.pi * frequency_hz * times_s
-    return np.stack([np.sin(angle), np.cos(angle), np.ones_like(angle)], axis=1)
-
-
-def _residuals(around: FloatArray, times_s: FloatArray, frequency_hz: float) -> FloatArray:
-    basis, _ = np.linalg.qr(_design(times_s, frequency_hz))
-    return np.asarray((around**2).sum(axis=1) - ((around @ basis) ** 2).sum(axis=1))
+    design = np.stack([np.sin(angle), np.cos(angle), np.ones_like(angle)], axis=1)
+    factors = around @ np.linalg.pinv(design).T
+    error = ((factors @ design.T - around) ** 2).mean(axis=1)
+    amplitude, span = np.hypot(factors[:, 0], factors[:, 1]), np.ptp(around, axis=1)
+    return factors, np.where(amplitude > span + STILL_M, np.inf, error)

@@ -60,6 +60,14 @@ def test_fit_is_no_worse_than_evolution() -> None:
         assert found.error[frame] <= evolved.fun + 1e-9
 
 
+def test_a_crest_is_not_taken_for_a_huge_slow_sine() -> None:
+    times_s = np.linspace(-1.0, 1.0, 121)
+    found = fit_sinusoids(1.0 - 0.3 * times_s**2, FPS)
+    windows = np.lib.stride_tricks.sliding_window_view(1.0 - 0.3 * times_s**2, 61)
+    assert (found.amplitude[30:-30] <= np.ptp(windows, axis=1) + 1e-5).all()
+    assert np.allclose(fit_sinusoids(np.ones(90), FPS).amplitude, 0.0)
+
+
 def test_source_is_normalised_within_a_second_and_still_limbs_give_nothing() -> None:
     source = source_function(sine(1.0, amplitude=0.2) + 5.0, FPS)
     assert np.allclose(source[60:-60].std(), 1.0, atol=0.05)
