@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reports.bootstrap import interval
+from reports.draws import draws_of, paired_draws
 from reports.records import BadRecord, Better, Measurement
 from reports.rows import Row, StoredRecord, check_comparable, groups, load_run, rows_of
 from reports.significance import (
+    LEVEL,
     SIGNIFICANCE,
     Difference,
     holm,
@@ -34,7 +35,6 @@ __all__ = [
     "groups",
     "holm",
     "load_run",
-    "mean_replicates_of",
     "paired_difference",
     "ranked_order",
     "rows_of",
@@ -77,8 +77,9 @@ class VarianceSplit:
 def estimate(row: Row, metric: str, slice_name: str) -> Estimate | None:
     """Mean over the row's records with its interval, or None if no record has the measurement.
 
-    The interval says how far the number would move on other tasks with the same trained weights. With several seeds
-    it comes from the replicates averaged over seeds; ``seed_sd`` stands beside it and is not part of it.
+    The interval says how far the number would move on other tasks with the same trained weights
+    (:func:`reports.draws.draws_of`). With several seeds it comes from the replicates averaged over seeds; ``seed_sd``
+    stands beside it and is not part of it.
     """
     found = row.measurements(metric, slice_name)
     if not found:
@@ -109,12 +110,10 @@ def _interval(
 ) -> tuple[float | None, float | None]:
     if value is None:
         return None, None
-    if len(known) == 1:
-        return known[0].low, known[0].high
-    replicates = mean_replicates_of(row, metric, slice_name)
-    if replicates is None:
-        return None, None
-    low, high = interval(value, replicates)
+    draws = draws_of(row, metric, slice_name)
+    if draws is None:
+        return (known[0].low, known[0].high) if len(known) == 1 else (None, None)
+    low, high = interval(value, draws.replicates, LEVEL, draws.degrees_of_freedom)
     return (low, high) if np.isfinite(low) else (None, None)
 
 
@@ -132,26 +131,6 @@ def _judge_sd(known: Sequence[Measurement]) -> float | None:
     return float(np.sqrt(np.mean(np.square(defined)))) if defined else None
 
 
-def mean_replicates_of(row: Row, metric: str, slice_name: str) -> NDArray[np.float64] | None:
-    """Replicates ``[B]`` of a metric averaged over the row's records, or None if a record has none.
-
-    Raises
-    ------
-    BadRecord : replicates of one row differ in number, or are shares where the record says percent.
-    """
-    name = f"replicates/{metric}|{slice_name}"
-    if len(row.samples) < len(row.ok) or any(name not in samples for samples in row.samples):
-        return None
-    stacks = [np.asarray(samples[name], dtype=np.float64) for samples in row.samples]
-    if len({stack.shape for stack in stacks}) != 1 or stacks[0].ndim != 1:
-        raise BadRecord(f"{row.method.name}: {name} must be [B] in every samples file, got {[s.shape for s in stacks]}")
-    mean = np.asarray(np.mean(stacks, axis=0), dtype=np.float64)
-    for measurement in row.measurements(metric, slice_name):
-        if measurement.unit == "%" and (measurement.value or 0.0) > 5.0 and float(np.nanmax(mean)) <= 1.0:
-            raise BadRecord(f"{row.method.name}: {name} are shares up to 1, but the record's value is in percent")
-    return mean
-
-
 def paired_difference(row_a: Row, row_b: Row, metric: str, slice_name: str) -> Difference | None:
     """A minus B on the same samples (each averaged over its seeds), or None where either has no value or replicates.
 
@@ -162,18 +141,17 @@ def paired_difference(row_a: Row, row_b: Row, metric: str, slice_name: str) -> D
     a, b = estimate(row_a, metric, slice_name), estimate(row_b, metric, slice_name)
     if a is None or b is None or a.value is None or b.value is None:
         return None
-    replicates_a, replicates_b = (mean_replicates_of(row, metric, slice_name) for row in (row_a, row_b))
-    if replicates_a is None or replicates_b is None:
+    draws_a, draws_b = (draws_of(row, metric, slice_name) for row in (row_a, row_b))
+    if draws_a is None or draws_b is None:
         return None
-    n_clusters = _shared_clusters(row_a, row_b, slice_name)
+    _check_same_samples(row_a, row_b)
     try:
-        return replicate_difference(a.value, b.value, replicates_a, replicates_b, n_clusters)
+        return replicate_difference(a.value, b.value, *paired_draws(draws_a, draws_b))
     except ValueError as error:
         raise BadRecord(f"{row_a.method.name} against {row_b.method.name}, {metric}|{slice_name}: {error}") from error
 
 
-def _shared_clusters(row_a: Row, row_b: Row, slice_name: str) -> int:
-    """Number of clusters in the slice, after checking that all samples files of both rows list the same samples."""
+def _check_same_samples(row_a: Row, row_b: Row) -> None:
     first = row_a.samples[0]
     for row in (row_a, row_b):
         for samples in row.samples:
@@ -183,8 +161,6 @@ def _shared_clusters(row_a: Row, row_b: Row, slice_name: str) -> int:
                         f"{row_a.method.name} and {row_b.method.name} were not scored on the same samples ({name}): "
                         "their difference is not paired; run both with the same protocol and profile"
                     )
-    inside = np.asarray(first.get(f"slice/{slice_name}", np.ones(len(first["cluster"]), dtype=bool)), dtype=bool)
-    return len(np.unique(first["cluster"][inside]))
 
 
 def tie_groups(rows: Sequence[Row], metric: str, slice_name: str) -> dict[str, int]:
@@ -192,26 +168,22 @@ def tie_groups(rows: Sequence[Row], metric: str, slice_name: str) -> dict[str, i
 
     Ranked are rows of kind method with status ok, not marked ``copies``, with a value and replicates. Every two of
     them are compared (:func:`paired_difference`); two are *separable* if Holm's adjusted p over all these comparisons
-    is below 0.05. Sorted by value, best first, each method takes the rank of the best group leader it is not
-    separable from, or leads a new group whose rank is its place (:func:`reports.significance.leader_ranks`).
+    is below ``SIGNIFICANCE``. Sorted by value, best first, each method takes the rank of the best group leader it is
+    not separable from, or leads a new group whose rank is its place (:func:`reports.significance.leader_ranks`).
     """
     ranked = ranked_order(rows, metric, slice_name)
     pairs = list(combinations(range(len(ranked)), 2))
-    p_values = []
-    for a, b in pairs:
-        difference = paired_difference(ranked[a], ranked[b], metric, slice_name)
-        p_values.append(1.0 if difference is None else difference.p)
+    found = [paired_difference(ranked[a], ranked[b], metric, slice_name) for a, b in pairs]
+    adjusted = holm([1.0 if difference is None else difference.p for difference in found])
     separable = np.zeros((len(ranked), len(ranked)), dtype=np.bool_)
-    for (a, b), adjusted in zip(pairs, holm(p_values), strict=True):
-        separable[a, b] = separable[b, a] = adjusted < SIGNIFICANCE
+    for (a, b), p in zip(pairs, adjusted, strict=True):
+        separable[a, b] = separable[b, a] = p < SIGNIFICANCE
     return {row.method.name: rank for row, rank in zip(ranked, leader_ranks(separable), strict=True)}
 
 
 def ranked_order(rows: Sequence[Row], metric: str, slice_name: str) -> list[Row]:
     """The rows that can carry a rank, best first; equal values in order of method name."""
-    able = [
-        row for row in rows if row.can_rank and row.samples and mean_replicates_of(row, metric, slice_name) is not None
-    ]
+    able = [row for row in rows if row.can_rank and draws_of(row, metric, slice_name) is not None]
     return [row for row in sorted_rows(able, metric, slice_name) if badness(row, metric, slice_name) < np.inf]
 
 
@@ -238,12 +210,11 @@ def variance_split(row: Row, metric: str, slice_name: str) -> VarianceSplit:
     found = estimate(row, metric, slice_name)
     if found is None or found.value is None:
         return VarianceSplit(None, None, None)
-    name = f"replicates/{metric}|{slice_name}"
-    spreads = [float(np.nanvar(samples[name], ddof=1)) for samples in row.samples if name in samples]
+    draws = draws_of(row, metric, slice_name)
     return VarianceSplit(
         judge_seed=found.judge_sd,
         method_seed=found.seed_sd,
-        task_sampling=float(np.sqrt(np.mean(spreads))) if spreads else None,
+        task_sampling=float(np.nanstd(draws.replicates, ddof=1)) if draws else None,
     )
 
 

@@ -13,7 +13,9 @@ from scipy import stats
 from reports.bootstrap import interval
 
 LEVEL = 0.95
-SIGNIFICANCE = 0.05
+SIGNIFICANCE = 0.04
+"""Level of the tests behind the promise that equal methods share a rank 95 % of the time: on synthetic task lists
+(``tests/reports/test_significance.py``) tests at 0.05 separate them in 5.3 %, at 0.04 in 4.3 %."""
 
 
 @dataclass(frozen=True)
@@ -32,33 +34,33 @@ def replicate_difference(
     value_b: float,
     replicates_a: NDArray[np.float64],
     replicates_b: NDArray[np.float64],
-    n_clusters: int,
+    degrees_of_freedom: float,
 ) -> Difference:
     """Difference A - B with its 95 % interval and p-value, from paired replicates ``[B]`` each.
 
     Replicate b of both methods must come from the same resampled clusters. The interval is the percentile interval of
     the replicate differences, shifted onto the measured difference (``bootstrap.interval``). The p-value is Student's,
-    with ``n_clusters - 1`` degrees of freedom and the replicates' standard deviation as standard error: counting
-    among 200 replicates could not go below 0.01 and would leave nothing separable after Holm's correction.
+    with the replicates' standard deviation as standard error: counting among 200 replicates could not go below 0.01 and
+    would leave nothing separable after Holm's correction.
 
     Raises
     ------
-    ValueError : shapes differ, fewer than two clusters, or fewer than half of the replicates are finite.
+    ValueError : shapes differ, less than one degree of freedom, or fewer than half of the replicates are finite.
     """
     if replicates_a.shape != replicates_b.shape or replicates_a.ndim != 1:
         raise ValueError(f"paired replicates must be [B] twice, got {replicates_a.shape} and {replicates_b.shape}")
-    if n_clusters < 2:
-        raise ValueError(f"a cluster bootstrap needs at least 2 clusters, got {n_clusters}")
+    if degrees_of_freedom < 1.0:
+        raise ValueError(f"a difference needs at least 2 clusters, got {degrees_of_freedom:g} degrees of freedom")
     differences = replicates_a - replicates_b
     differences = differences[np.isfinite(differences)]
     if 2 * differences.size < replicates_a.size or differences.size < 2:
         raise ValueError(f"only {differences.size} of {replicates_a.size} replicate differences are finite")
     value = float(value_a - value_b)
-    low, high = interval(value, differences, LEVEL)
-    return Difference(value, low, high, _two_sided_p(value, float(differences.std(ddof=1)), n_clusters - 1))
+    low, high = interval(value, differences, LEVEL, degrees_of_freedom)
+    return Difference(value, low, high, _two_sided_p(value, float(differences.std(ddof=1)), degrees_of_freedom))
 
 
-def _two_sided_p(value: float, standard_error: float, degrees_of_freedom: int) -> float:
+def _two_sided_p(value: float, standard_error: float, degrees_of_freedom: float) -> float:
     """Student's two-sided p. Without any spread a difference is either none at all (1) or certain (0)."""
     if standard_error < 1e-12 * max(1.0, abs(value)):
         return 1.0 if abs(value) < 1e-12 else 0.0

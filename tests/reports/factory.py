@@ -158,12 +158,12 @@ def joint_recognition_arrays(
         "sample_id": np.arange(tasks.n, dtype=np.int32),
         "cluster": tasks.cluster,
         **{f"slice/{name}": tasks.inside(name) for name in SLICES},
-        "per_sample/joint_recognition": np.mean(per_judge, axis=0).astype(np.float32),
+        "per_sample/joint_recognition": (100.0 * np.mean(per_judge, axis=0)).astype(np.float32),
     }
     for number, hits in enumerate(per_judge):
         arrays[f"judge/stgcn-joint/{number}"] = hits.astype(np.int8)
     for name in SLICES:
-        arrays[f"replicates/joint_recognition|{name}"] = 100.0 * sliced_replicates(
+        arrays[f"replicates/joint_recognition|{name}"] = sliced_replicates(
             arrays["per_sample/joint_recognition"], tasks, name
         )
     return arrays
@@ -176,7 +176,7 @@ def sliced_replicates(values: NDArray[Any], tasks: FakeTasks, slice_name: str) -
 
 def _joint_measurement(arrays: dict[str, NDArray[Any]], tasks: FakeTasks, slice_name: str) -> Measurement:
     inside = tasks.inside(slice_name)
-    value = float(100.0 * arrays["per_sample/joint_recognition"][inside].mean(dtype=np.float64))
+    value = float(arrays["per_sample/joint_recognition"][inside].mean(dtype=np.float64))
     low, high = interval(value, arrays[f"replicates/joint_recognition|{slice_name}"])
     judges = tuple(float(100.0 * arrays[f"judge/stgcn-joint/{j}"][inside].mean()) for j in range(N_JUDGES))
     return Measurement(

@@ -132,5 +132,10 @@ def test_mean_replicates_by_hand_and_with_gaps() -> None:
 
 def test_interval_is_centred_on_the_value() -> None:
     low, high = interval(10.0, np.linspace(100.0, 104.0, 201))
-    assert low == pytest.approx(8.1) and high == pytest.approx(11.9)
+    # of 201 replicates 0.02 apart, quantile 0.025 is the 5.05th from below
+    assert low == pytest.approx(8.081) and high == pytest.approx(11.919)
+    # Student's quantile with 4 degrees of freedom is 2.776, the normal one 1.960
+    assert interval(10.0, np.linspace(100.0, 104.0, 201), degrees_of_freedom=4)[0] == pytest.approx(
+        10 - 1.919 * 1.4166, rel=1e-4
+    )
     assert np.isnan(interval(1.0, np.full(5, np.nan))).all()

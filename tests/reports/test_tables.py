@@ -118,16 +118,16 @@ def test_pareto_front_by_hand_and_nan_never_leads(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("a", "b", "clusters", "message"),
+    ("a", "b", "freedom", "message"),
     [
         (np.zeros(3), np.zeros(4), 5, "paired replicates must be"),
-        (np.zeros(3), np.zeros(3), 1, "at least 2 clusters"),
+        (np.zeros(3), np.zeros(3), 0, "at least 2 clusters"),
         (np.full(3, np.nan), np.zeros(3), 5, "are finite"),
     ],
 )
-def test_differences_refuse_what_is_not_paired(a: np.ndarray, b: np.ndarray, clusters: int, message: str) -> None:
+def test_differences_refuse_what_is_not_paired(a: np.ndarray, b: np.ndarray, freedom: int, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        replicate_difference(0.0, 0.0, a, b, clusters)
+        replicate_difference(0.0, 0.0, a, b, freedom)
 
 
 @pytest.mark.parametrize(("field", "value"), [("protocol_version", 2), ("dataset_digest", "other"), ("judges", ())])

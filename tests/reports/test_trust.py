@@ -158,7 +158,7 @@ def test_page_says_what_was_measured_and_is_checked(tmp_path: Path) -> None:
     text = page.read_text()
     assert "**toy@1, joint recognition**: between judge seeds 0.60 (least 0.60), between families 0.80, over 5" in text
     assert "**under 0.9**" in text and "row a and row b (11.0 / 19.5 against 15.0 / 12.0)" in text
-    assert "- one: plain, sad" in text and "| row e |" in text and "40 samples) and the others\n(41 samples)" in text
+    assert "- one: plain, sad" in text and "| row e |" in text and "(40 samples) and the others\n(41)" in text
     page.write_text(text.replace("0.60", "0.99"))
     assert "differs from the stored numbers" in check_page(page, folder)
 
