@@ -74,5 +74,5 @@ def test_a_pair_is_drawn_in_one_way(tmp_path: Path) -> None:
     assert paired_draws(anew, anew)[0].shape == (1000,)
     first, second, freedom = paired_draws(anew, kept)
     assert first is anew.stored and second is kept.stored and freedom == anew.n_clusters - 1.0
-    difference = paired_difference(row_with(tmp_path / "a"), row_with(tmp_path / "b"), *PRIMARY)
+    difference = paired_difference(row_with(tmp_path / "a"), row_with(tmp_path / "b", shift=1.0), *PRIMARY)
     assert difference is not None and difference.value == pytest.approx(-1.0)
