@@ -316,13 +316,21 @@ app.add_typer(data_app, name="data")
 @app.command()
 def report(
     run_folder: Annotated[Path, typer.Argument(help="A run folder.")],
+    store: Annotated[Path, typer.Option(help="The store of the run; it has the motions that the page plays.")] = STORE,
     as_json: Annotated[bool, typer.Option("--json")] = False,
 ) -> None:
-    """Write tables and figures of a run from its records, and print the table.
+    """Write tables, figures and a page with the motions of a run, and print the table.
 
     Example: stylebench report runs/latest
     """
-    if _report_run(run_folder, as_json, ""):
+    from bench.suite.page import build_page
+    from bench.suite.store import Store
+
+    failed = _report_run(run_folder, as_json, "")
+    page = build_page(run_folder, Store(store.absolute()))
+    if not as_json:
+        console.say(f"page: {page}")
+    if failed:
         raise typer.Exit(1)
 
 

@@ -149,7 +149,7 @@ def _fitted(store: Store, setting: Setting, cell: Cell, outcome: Outcome | None)
     if outcome is not None and outcome.status != "ok":
         return Fitted(setting.dataset.dataset_id, name, cell.seed, outcome)
     folder = store.folder("fit", cell.fit_key)
-    curves = _curves(folder, cell.seed)
+    curves = read_curves(folder, f"seed {cell.seed}")
     last = () if curves is None else tuple(zip(curves.names, curves.values[-1].tolist(), strict=True))
     return Fitted(
         dataset=setting.dataset.dataset_id,
@@ -164,14 +164,14 @@ def _fitted(store: Store, setting: Setting, cell: Cell, outcome: Outcome | None)
     )
 
 
-def _curves(folder: Path, seed: int) -> TrainingCurves | None:
+def read_curves(folder: Path, label: str) -> TrainingCurves | None:
     """The loss curves that a learned adapter leaves beside its weights; None where there are none."""
     path = folder / CURVES_FILE
     if not path.is_file():
         return None
     with np.load(path, allow_pickle=False) as stored:
         names = tuple(str(name) for name in stored["names"])
-        return TrainingCurves(f"seed {seed}", names, stored["steps"], stored["values"])
+        return TrainingCurves(label, names, stored["steps"], stored["values"])
 
 
 def _seconds(folder: Path) -> float:
@@ -185,7 +185,9 @@ def _seconds(folder: Path) -> float:
 def _draw(store: Store, setting: Setting, cells: Sequence[Cell], order: FitOrder) -> None:
     for name in dict.fromkeys(cell.facts.name for cell in cells):
         own = [cell for cell in cells if cell.facts.name == name and store.has("fit", cell.fit_key)]
-        curves = [found for cell in own if (found := _curves(store.folder("fit", cell.fit_key), cell.seed))]
+        curves = [
+            found for cell in own if (found := read_curves(store.folder("fit", cell.fit_key), f"seed {cell.seed}"))
+        ]
         if curves:
             title = f"{name}, budget {order.budget}, {setting.dataset.dataset_id}"
             save_losses(order.out / f"{name}-{order.budget}-{setting.dataset.name}.png", title, curves)

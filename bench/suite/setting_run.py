@@ -12,6 +12,7 @@ from bench.suite import assemble
 from bench.suite.calls import CellAnswer, CellCall, lacks, made_here
 from bench.suite.cell import GenerateJob
 from bench.suite.embedding import Embedding
+from bench.suite.inputs import note_inputs
 from bench.suite.judging import JudgesOnDisk, judges_for, stored_embedding
 from bench.suite.motions import Motions
 from bench.suite.plan import Cell
@@ -55,6 +56,7 @@ class SettingRun:
         calls = [self._call(cells[place]) for place in waiting]
         answers |= dict(zip(waiting, self.session.answers(calls, self._name, before=len(answers)), strict=True))
         records = [self._record(cell, answers[place], records_folder) for place, cell in enumerate(cells)]
+        note_inputs(records_folder.parent, self.setting, self.spec.truth_key, cells)
         return Part(
             tuple(records),
             sum(answer.generated for answer in answers.values()),
