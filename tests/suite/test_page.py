@@ -49,6 +49,7 @@ def page(page_file: Path) -> Iterator[Any]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         shown: Any = browser.new_context(offline=True).new_page()
+        shown.set_default_timeout(120_000)  # a busy machine draws slowly
         shown.heard, shown.asked = [], []
         shown.on("console", lambda message: shown.heard.append(message.text))
         shown.on("pageerror", lambda error: shown.heard.append(str(error)))
