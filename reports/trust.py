@@ -170,6 +170,17 @@ class Turned(NamedTuple):
     """whether their 95 % intervals under the first family leave each other out"""
 
 
+class LeftOut(NamedTuple):
+    """The row without which an order agrees best."""
+
+    title: str
+    first: tuple[float, ...]
+    """its number by judge seed of the first family"""
+    second: tuple[float, ...]
+    tau: float
+    """agreement without it"""
+
+
 class Agreement(NamedTuple):
     """Kendall's tau of the order of rows by one metric; NaN where there is nothing to compare."""
 
@@ -185,6 +196,10 @@ class Agreement(NamedTuple):
     families: float
     """between the means over seeds of both families"""
     turned: tuple[Turned, ...]
+    seeds_without: LeftOut
+    """of ``seeds``"""
+    families_without: LeftOut
+    """of ``families``"""
 
 
 def order_agreement(first: ArrayLike, second: ArrayLike) -> float:
@@ -213,7 +228,19 @@ def _agreement(data: TrustData, metric: str, slice_name: str) -> Agreement:
     n_rows = int(np.isfinite(means[0]).sum())
     turned = _turned(data, metric, *means)
     families = order_agreement(*means)
-    return Agreement(metric, slice_name, n_rows, seeds, least, second_seeds, second_least, families, turned)
+    without = [np.arange(len(first)) != place for place in range(len(first))]
+    return Agreement(
+        metric, slice_name, n_rows, seeds, least, second_seeds, second_least, families, turned,
+        _left_out(data, metric, [_between_seeds(first[kept])[0] for kept in without]),
+        _left_out(data, metric, [order_agreement(means[0][kept], means[1][kept]) for kept in without]),
+    )  # fmt: skip
+
+
+def _left_out(data: TrustData, metric: str, taus: list[float]) -> LeftOut:
+    """The row with the best agreement among those ``[rows]`` without one row each."""
+    best = int(np.argmax(np.nan_to_num(taus, nan=-2.0)))
+    first, second = (tuple(data.values(metric, family)[best].tolist()) for family in ("first", "second"))
+    return LeftOut(list(data.methods.values())[best], first, second, taus[best])
 
 
 def _between_seeds(values: Floats) -> tuple[float, float]:

@@ -99,7 +99,26 @@ def _verdict(data: TrustData, found: Agreement) -> str:
     )
     if all(tau >= TAU_BAR for tau in taus):
         return f"{head}: reaches {TAU_BAR:g}.{_turned_words(found, data)}"
-    return f"{head}: **under {TAU_BAR:g}**.{_turned_words(found, data)}"
+    return f"{head}: **under {TAU_BAR:g}**.{_without_words(found)}{_turned_words(found, data)}"
+
+
+def _without_words(found: Agreement) -> str:
+    """One row that the low agreement is owed to, if there is one."""
+    words = ""
+    if found.seeds < TAU_BAR:
+        row = found.seeds_without
+        words += (
+            f" Without {escape_markdown(row.title)}, by seed {_values(row.first, found.metric)}, seeds agree by "
+            f"{_tau(row.tau)}."
+        )
+    if found.families < TAU_BAR:
+        row = found.families_without
+        means = (float(np.mean(row.first)), float(np.mean(row.second)))
+        words += (
+            f" Without {escape_markdown(row.title)}, {_values(means, found.metric)} by family, families agree by "
+            f"{_tau(row.tau)}."
+        )
+    return words
 
 
 def _turned_words(found: Agreement, data: TrustData) -> str:
@@ -123,8 +142,8 @@ def _pairs(pairs: Sequence[Turned], metric: str) -> str:
     )
 
 
-def _values(pair: tuple[float, float], metric: str) -> str:
-    return " / ".join(number(value, UNITS.get(metric, "distance")) for value in pair)
+def _values(values: Sequence[float], metric: str) -> str:
+    return " / ".join(number(value, UNITS.get(metric, "distance")) for value in values)
 
 
 def _section(data: TrustData) -> dict[str, object]:

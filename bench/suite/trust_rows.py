@@ -13,7 +13,7 @@ from bench.arrays import BoolArray, FloatArray, IntArray
 from bench.datasets.take import Take
 from bench.metrics.frechet import PrincipalComponents
 from bench.metrics.kernel import LabelledFeatures, conditional_kid
-from bench.protocols.base import neutral_style, stable_seed
+from bench.protocols.base import neutral_style
 from bench.suite.embedding import Embedding
 from bench.suite.judges import JudgeSet
 from bench.suite.judging import stored_embedding
@@ -32,7 +32,7 @@ from bench.suite.scores.distances import floors
 from bench.suite.second_judges import SecondJudges
 from bench.suite.setting import Setting
 from bench.suite.store import Store
-from reports.bootstrap import cluster_counts, interval, mean_replicates
+from reports.bootstrap import Layout, interval
 from reports.records import Measurement, Record, read_samples
 from reports.rows import StoredRecord
 from reports.trust import JudgedNumber, SessionNumbers, Source, SplitNumber, TrustRow
@@ -112,7 +112,8 @@ class Opinions:
             style_components=_components(part.style_features),
             content_components=_components(part.content_features),
         )
-        return replace(whole, floors=floors(whole, setting.protocol.metrics))
+        known = tuple(metric for metric in setting.protocol.metrics if metric not in FIRST_ONLY)
+        return replace(whole, floors=floors(whole, known))
 
     def _labelled(self, motions: Motions) -> Labelled:
         dataset = self.setting.dataset
@@ -148,14 +149,18 @@ class Opinions:
         samples = read_samples(stored.path, stored.record)
         different = np.asarray(samples[f"slice/{PRIMARY_SLICE}"], dtype=bool)
         neutral = np.array([task.source_style == self.neutral for task in self.setting.tasks])
-        counts = cluster_counts(samples["cluster"], seed=stable_seed("bootstrap", self.setting.protocol.label))
+        contents = np.array([task.content for task in self.setting.tasks])
         masks: dict[Source, BoolArray] = {"neutral": different & neutral, "other": different & ~neutral}
         for source, mask in masks.items():
             for metric in SPLIT_METRICS:
                 values = np.asarray(samples[f"per_sample/{metric}"], dtype=np.float64)[mask]
-                value = float(values.mean())
-                low, high = interval(value, mean_replicates(values, counts[:, mask]))
-                yield SplitNumber(source=source, metric=metric, value=value, low=low, high=high, n=int(mask.sum()))
+                value, layout = float(values.mean()), Layout.of(samples["cluster"][mask], contents[mask])
+                freedom = layout.degrees_of_freedom(values)
+                low, high = interval(value, layout.replicates(values), degrees_of_freedom=freedom)
+                yield SplitNumber(
+                    source=source, metric=metric, value=value, low=max(low, 0.0), high=min(high, 100.0),
+                    n=int(mask.sum()),
+                )  # fmt: skip
             value = self._conditional_kid(judged, mask)
             yield SplitNumber(
                 source=source, metric="conditional_kid", value=value, low=None, high=None, n=int(mask.sum())

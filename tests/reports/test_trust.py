@@ -193,3 +193,19 @@ def test_figure_shows_every_curve_and_nothing_is_cut_off() -> None:
             assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= width + 1 and box.y1 <= height + 1, text.get_text()
     with pytest.raises(BadRecord, match="no curve"):
         sample_size_figure([])
+
+
+def test_the_page_is_what_the_stored_numbers_give() -> None:
+    root = Path(__file__).resolve().parents[2]
+    assert check_page(root / "docs" / "trust.md", root / "reports" / "published_trust") == ""
+    stored = read_trust(root / "reports" / "published_trust")
+    assert {"procedural@1", "bandai-namco@1"} <= set(stored)
+    assert stored["bandai-namco@1"].sessions and all(data.curves for data in stored.values())
+
+
+def test_a_low_agreement_names_the_row_it_is_owed_to() -> None:
+    found = {agreement.metric: agreement for agreement in agreements(trust_data())}["joint_recognition"]
+    # seeds turn (c, e) and (d, e); families turn (a, b)
+    assert found.seeds_without.title == "row e" and found.seeds_without.tau == pytest.approx(1.0)
+    assert found.families_without.title in ("row a", "row b") and found.families_without.tau == pytest.approx(1.0)
+    assert "Without row e, by seed 50.0 / 30.0, seeds agree by 1.00." in verdicts(trust_data())[0]
