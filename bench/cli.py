@@ -15,6 +15,7 @@ from bench import __version__, console
 from bench.command_options import RUNS, STORE, data_of, datasets_of, names_of, seeds_of
 from bench.data_commands import FpsOption, UnitOption, UpOption, data_app, overrides_of
 from bench.errors import BadConfig, BenchError
+from bench.nightly_command import nightly
 from bench.trust_commands import ladder, trust
 
 if TYPE_CHECKING:
@@ -360,6 +361,7 @@ def leaderboard(
     console.say(f"wrote {path}")
 
 
+app.command()(nightly)
 app.command()(ladder)
 app.command()(trust)
 

@@ -48,15 +48,20 @@ def tiny_dataset() -> Dataset:
     return Dataset("tiny", "tiny@1", "tiny-1", tuple(takes), {c: c for c in CONTENTS}, "none", "this test")
 
 
-def tiny_run(out: Path, store: Path, versions: dict[str, int] | None = None, **options: Any) -> RunResult:
-    """Run the tiny benchmark; ``versions`` raises the versions of metrics, ``options`` are those of the request."""
+def tiny_setup() -> None:
+    """Put the tiny dataset, task lists of twelve and small judges into the tables of this process."""
     DATASETS["tiny"] = DatasetEntry(lambda path, progress: tiny_dataset(), "tiny", "none", "none", needs_path=False)
     name = "stylebench-transfer@1"
     PROTOCOLS[name] = replace(PROTOCOLS[name], n_samples={"smoke": 12, "quick": 12, "standard": 12})
-    for metric, version in (versions or {}).items():
-        METRICS[metric] = replace(METRICS[metric], version=version)
     quick = JudgeRecipe(TrainingConfig(n_steps=60), TrainingConfig(n_steps=20))
     judging.train_judges = partial(train_judges, seeds=(0,), recipe=quick)  # type: ignore[attr-defined]
+
+
+def tiny_run(out: Path, store: Path, versions: dict[str, int] | None = None, **options: Any) -> RunResult:
+    """Run the tiny benchmark; ``versions`` raises the versions of metrics, ``options`` are those of the request."""
+    tiny_setup()
+    for metric, version in (versions or {}).items():
+        METRICS[metric] = replace(METRICS[metric], version=version)
     request = replace(RunRequest({"tiny": None}, out, store, METHODS, profile="smoke", jobs=1), **options)
     return run(request, lambda *_: None)
 
