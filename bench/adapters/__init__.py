@@ -22,7 +22,6 @@ from bench.adapters.conv1d_adain import Conv1dAdain
 from bench.adapters.fitted_anchors import ClassifyAndRetrieve, MeanPose, NearestPose, StyleMeanShift
 from bench.adapters.gesture_oracles import GESTURE_ORACLES
 from bench.adapters.holden2016 import Holden2016
-from bench.adapters.holden2016 import Holden2016
 from bench.adapters.kuriyama2022 import KURIYAMA
 from bench.adapters.mason2022 import MASON_2022
 from bench.adapters.motion_puzzle import MOTION_PUZZLE
@@ -50,7 +49,6 @@ _TABLE: tuple[type[Adapter], ...] = (
     NearestPose,
     ClassifyAndRetrieve,
     *GESTURE_ORACLES,
-    Holden2016,
     Holden2016,
     Aberman2020,
     Aberman2020Content,
