@@ -149,6 +149,15 @@ def test_the_sum_is_the_sum_and_names_its_parts(basis: Basis) -> None:
         assert list(measured.details.values()) == pytest.approx(parts)
 
 
+@pytest.mark.parametrize("name", list(FORMS))
+def test_records_are_means_over_samples(name: str, basis: Basis) -> None:
+    clips = [lifted(STYLES[style].clip, 0.5) for _, style in PAIRS]
+    scored = hand_error(name, row_of(clips), basis)
+    for slice_name, samples in (("all", slice(None)), ("intra", slice(2)), ("inter", slice(2, None))):
+        value = found(scored, slice_name).value
+        assert value and value == pytest.approx(scored.per_sample[name][samples].mean())
+
+
 def test_slices_intervals_and_replicates(basis: Basis) -> None:
     scored = hand_error("style_error", COPY_CONTENT, basis)
     values = scored.per_sample["style_error"]
