@@ -6,6 +6,7 @@ import os
 import shlex
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,7 @@ from bench.command_options import RUNS, STORE, data_of, datasets_of, names_of, s
 from bench.data_commands import FpsOption, UnitOption, UpOption, data_app, overrides_of
 from bench.errors import BadConfig, BenchError
 from bench.nightly_command import nightly
+from bench.show_commands import movie, study, study_score
 from bench.trust_commands import ladder, trust
 
 if TYPE_CHECKING:
@@ -327,7 +329,7 @@ def report(
     from bench.suite.page import build_page
     from bench.suite.store import Store
 
-    failed = _report_run(run_folder, as_json, "")
+    failed = _report_run(run_folder, as_json, "", ("png", "pdf", "svg"))
     page = build_page(run_folder, Store(store.absolute()))
     if not as_json:
         console.say(f"page: {page}")
@@ -362,6 +364,9 @@ def leaderboard(
 
 
 app.command()(nightly)
+app.command()(movie)
+app.command()(study)
+app.command(name="study-score")(study_score)
 app.command()(ladder)
 app.command()(trust)
 
@@ -408,11 +413,11 @@ def _print_plan(request: RunRequest, as_json: bool) -> None:
         console.show_rows(headers, rows)
 
 
-def _report_run(folder: Path, as_json: bool, summary: str) -> bool:
-    """Write and print a run's tables; True where a cell failed."""
+def _report_run(folder: Path, as_json: bool, summary: str, forms: Sequence[str] = ("png",)) -> bool:
+    """Write and print a run's tables; True where a cell failed. ``forms`` are those of the figures."""
     from bench.suite.output import failures, write_report
 
-    texts = write_report(folder)
+    texts = write_report(folder, forms)
     failed = failures(folder)
     if as_json:
         console.say_json({"run": str(folder), "summary": summary, "failed": failed})

@@ -102,7 +102,7 @@ def write_page(
         write_text_atomically(folder / asset, (ASSETS / asset).read_text(encoding="utf-8"))
     write_text_atomically(folder / "plotly.min.js", plotly.offline.get_plotlyjs())
     for player in players:
-        call = f"stylebench.load({_script_json(player.name)}, {_script_json(_player_data(player))});\n"
+        call = f"stylebench.load({script_json(player.name)}, {script_json(_player_data(player))});\n"
         write_text_atomically(folder / "data" / f"{player.name}.js", call)
     return folder / "index.html"
 
@@ -163,7 +163,12 @@ def _numbers(values: NDArray[np.float64]) -> list[float | None]:
     return [float(f"{value:.5g}") if np.isfinite(value) else None for value in values]
 
 
-def _script_json(value: Any) -> str:
+def body_data(body: Body, sample: int, title: str) -> dict[str, str]:
+    """One motion of a body under another title."""
+    return {"title": title, "positions": _positions(body.positions_m[sample])}
+
+
+def script_json(value: Any) -> str:
     """JSON that may stand in a script: no ``</script>`` and no line separators."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     for sign in "<>&\u2028\u2029":

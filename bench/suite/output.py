@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -18,8 +18,10 @@ from reports.rows import GroupKey, group_key, load_run
 from reports.tables import Column, Table, TableRow, tables_of_run
 
 
-def write_report(folder: Path) -> list[str]:
-    """Write ``tables.md``, one CSV and one figure per table into a run folder; returns the tables as plain text.
+def write_report(folder: Path, forms: Sequence[str] = ("png",)) -> list[str]:
+    """Write ``tables.md``, one CSV and the figures of each table into a run folder; returns the tables as plain text.
+
+    ``forms`` of the figures: ``png``, ``pdf``, ``svg``.
 
     Raises
     ------
@@ -32,7 +34,8 @@ def write_report(folder: Path) -> list[str]:
         pages.append(f"# {table.title}\n\n{render(table, 'md')}\n\n## Details\n\n{render(table, 'md', 'details')}")
         write_text_atomically(folder / f"{stem}.csv", render(table, "csv"))
         for name, figure in _figures(table):
-            save_figure(figure, folder / f"{stem}-{name}.png")
+            for form in forms:
+                save_figure(figure, folder / f"{stem}-{name}.{form}")
     write_text_atomically(folder / "tables.md", "\n\n".join(pages) + "\n")
     return texts
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ def build_page(run_folder: Path, store: Store) -> Path:
     """
     tables = tables_of_run(run_folder)
     folders = motions_folders(store)
-    players = [player for table in tables if (player := _player(run_folder, table, store, folders))]
+    players = [player for table in tables if (player := player_of(run_folder, table, store, folders))]
     title = f"Stylebench: {', '.join(sorted({table.key.dataset for table in tables}))}"
     made = sorted({record.provenance.time_utc[:10] for t in tables for row in t.rows for record in row.row.ok})
     subtitle = (
@@ -67,8 +67,25 @@ def build_page(run_folder: Path, store: Store) -> Path:
     return write_page(run_folder / "page", title, subtitle, [s for s in sections if s is not None], players)
 
 
-def _player(run_folder: Path, table: Table, store: Store, folders: Mapping[str, Path]) -> PlayerTable | None:
-    rows = [row for row in table.rows if row.row.ok and row.row.ok[0].motions_digest in folders][:MOST_BODIES]
+def player_of(
+    run_folder: Path,
+    table: Table,
+    store: Store,
+    folders: Mapping[str, Path],
+    *,
+    names: Collection[str] = (),
+    sample_ids: Collection[str] = (),
+) -> PlayerTable | None:
+    """What a table can show, or None where the store lacks it.
+
+    Parameters
+    ----------
+    folders : digest of motions -> where the store has them (:func:`bench.suite.trust.motions_folders`).
+    names : rows to show; empty for the first ``MOST_BODIES``.
+    sample_ids : samples to show; empty for ``N_SAMPLES`` spread over the list.
+    """
+    rows = [row for row in table.rows if row.row.ok and row.row.ok[0].motions_digest in folders]
+    rows = [row for row in rows if row.row.method.name in names] if names else rows[:MOST_BODIES]
     if not rows:
         return None
     digest = table.facts.get("tasks digest", "")
@@ -79,6 +96,8 @@ def _player(run_folder: Path, table: Table, store: Store, folders: Mapping[str, 
     tasks = read_tasks(tasks_file)
     pack, fps = Pack.open(store.folder("takes", str(facts["takes"]))), float(facts["fps"])
     chosen = np.unique(np.linspace(0, len(tasks) - 1, N_SAMPLES).astype(int))
+    if sample_ids:
+        chosen = np.flatnonzero([task.sample_id in sample_ids for task in tasks])
     picked = [tasks[place] for place in chosen]
     bodies = {
         "content": _body("source", [source_of(task, pack, fps).clip for task in picked]),
