@@ -24,6 +24,8 @@ from bench.motion.skeleton import CANONICAL_PARENTS, LEFT_FINGER, RIGHT_FINGER
 
 BONES = tuple(joint for joint in range(1, len(CANONICAL_PARENTS)) if joint not in (LEFT_FINGER, RIGHT_FINGER))
 """Ends of the bones whose length is held; fingers are virtual in most data."""
+FARTHEST = 6.0
+"""Standard deviations from the mean to which inputs are held."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,13 @@ class MasonNetwork(nn.Module):
         return code
 
     def standard(self, inputs: Tensor, gates: Tensor, code: Tensor) -> Tensor:
-        """Inputs ``[B, n_input]`` to standardised outputs ``[B, n_output]``."""
-        result: Tensor = self.model(self.input_scale(inputs), gates, code)
+        """Inputs ``[B, n_input]`` to standardised outputs ``[B, n_output]``.
+
+        Inputs farther from their mean than any training has are held there: a body that has left its path must be
+        able to come back, and what is fed back must not grow without end.
+        """
+        known = self.input_scale(inputs).clamp(-FARTHEST, FARTHEST)
+        result: Tensor = self.model(known, gates, code)
         return result
 
     def forward(self, inputs: Tensor, gates: Tensor, code: Tensor) -> Tensor:

@@ -243,3 +243,12 @@ def test_statistics_are_taken_over_all_styles() -> None:
 def test_poses_are_rotations_whatever_the_network_says() -> None:
     _, rotations = pose_of(np.random.default_rng(0).normal(size=(5, 252)))
     assert np.allclose(np.linalg.norm(rotations, axis=-1), 1.0)
+
+
+def test_what_is_fed_back_does_not_grow_without_end() -> None:
+    config, network = trained("pfnn-onehot")
+    far = torch.full((1, config.layout.n_input), 1e6)
+    farther = torch.full((1, config.layout.n_input), 1e9)
+    code = torch.tensor([[1.0, 0.0]])
+    with torch.no_grad():
+        assert torch.equal(network(far, torch.zeros(1, 1), code), network(farther, torch.zeros(1, 1), code))
