@@ -24,7 +24,7 @@ from bench.motion.skeleton import CANONICAL_PARENTS, LEFT_FINGER, RIGHT_FINGER
 
 BONES = tuple(joint for joint in range(1, len(CANONICAL_PARENTS)) if joint not in (LEFT_FINGER, RIGHT_FINGER))
 """Ends of the bones whose length is held; fingers are virtual in most data."""
-FARTHEST = 6.0
+FARTHEST = 10.0
 """Standard deviations from the mean to which inputs are held."""
 
 
@@ -115,18 +115,18 @@ class MasonNetwork(nn.Module):
         return code
 
     def standard(self, inputs: Tensor, gates: Tensor, code: Tensor) -> Tensor:
-        """Inputs ``[B, n_input]`` to standardised outputs ``[B, n_output]``.
-
-        Inputs farther from their mean than any training has are held there: a body that has left its path must be
-        able to come back, and what is fed back must not grow without end.
-        """
-        known = self.input_scale(inputs).clamp(-FARTHEST, FARTHEST)
-        result: Tensor = self.model(known, gates, code)
+        """Standardised inputs ``[B, n_input]`` to standardised outputs ``[B, n_output]``."""
+        result: Tensor = self.model(inputs, gates, code)
         return result
 
     def forward(self, inputs: Tensor, gates: Tensor, code: Tensor) -> Tensor:
-        """Inputs ``[B, n_input]`` to outputs ``[B, n_output]`` in their own units."""
-        return self.output_scale.inverse(self.standard(inputs, gates, code))
+        """Inputs ``[B, n_input]`` to outputs ``[B, n_output]`` in their own units.
+
+        Inputs far from everything that training saw are held: what is fed back must not grow without end.
+        """
+        known = self.input_scale(inputs).clamp(-FARTHEST, FARTHEST)
+        result: Tensor = self.output_scale.inverse(self.standard(known, gates, code))
+        return result
 
 
 def l_mse(true: Tensor, predicted: Tensor) -> Tensor:
@@ -181,7 +181,7 @@ class MasonTraining(Trainable):
         network.train()
         code = network.code(clips[None, frames], self._one_hot(style, inputs)).expand(config.batch, -1)
         true = network.output_scale(outputs[rows])
-        predicted = network.standard(inputs[rows], gates[rows], code)
+        predicted = network.standard(network.input_scale(inputs[rows]), gates[rows], code)
         mse = l_mse(true, predicted)
         pose = config.layout.pose
         bll = l_bll(outputs[rows][:, pose], network.output_scale.inverse(predicted)[:, pose])
