@@ -42,6 +42,7 @@ def nightly(
         )
     else:
         console.say(text)
-        console.say(f"page: {result.folder / 'page' / 'index.html'}")
+        page = result.folder / "page" / "index.html"
+        console.say(f"page: {page}" if page.is_file() else f"summary: {result.folder / SUMMARY}")
     if not result.good:
         raise typer.Exit(1)

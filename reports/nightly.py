@@ -145,7 +145,7 @@ def summary(night: str, before: str, comparison: Comparison | None, failed: Mapp
     bad = len(failed) + (len(comparison.regressions) + len(comparison.lost) if comparison else 0)
     lines = [f"# Night {night}: {f'{bad} to look at' if bad else 'all is well'}", ""]
     if comparison is None:
-        lines += ["The first good night: there is nothing to compare it with.", ""]
+        lines += ["Not compared with another night.", ""]
     else:
         lines += [
             f"Compared with {before}: {comparison.compared} numbers whose motions changed, one family of tests "

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.adapters import ADAPTERS
 from bench.errors import BadConfig
 from bench.protocols import PROTOCOLS
 from bench.suite import nightly
@@ -112,6 +113,13 @@ def test_config_is_read_relative_to_its_file(tmp_path: Path) -> None:
     assert config.data == ("procedural", f"bandai-namco={tmp_path / 'data.zip'}")
     assert config.adapters == (str(tmp_path / "mine.py"),)
     assert config.seeds == (1,)
+
+
+def test_the_example_can_be_used_as_it_is(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples" / "nightly" / "nightly.toml"
+    config = read_config(example)
+    assert set(config.methods) <= set(ADAPTERS)
+    assert config.folder == example.parent / "nightly"
 
 
 @pytest.mark.parametrize(
