@@ -48,7 +48,7 @@ from typing import TYPE_CHECKING
 import numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from typing import Any
 
 PROTOCOL = 1
@@ -403,8 +403,7 @@ class Worker:
     def _keep(self, answer: Any, name: str) -> str:
         """Store an answer in the exchange folder; its file name there."""
         if isinstance(answer, (str, os.PathLike)):
-            shutil.copyfile(os.fspath(answer), str(self.exchange / (name + ".bvh")))
-            return name + ".bvh"
+            return self._put(name + ".bvh", lambda path: shutil.copyfile(os.fspath(answer), path))
         if isinstance(answer, (tuple, list)) and len(answer) == 2:
             answer = {"rotations_wxyz": answer[0], "root_xyz_m": answer[1]}
         elif isinstance(answer, Motion):
@@ -413,8 +412,15 @@ class Worker:
             raise TypeError(f"answer with (rotations_wxyz, root_xyz_m), got {type(answer).__name__}")
         wanted = ARRAYS if "offsets_m" in answer else ARRAYS[:2]
         arrays = {key: _as_array(answer[key]) for key in wanted}
-        numpy.savez(str(self.exchange / (name + ".npz")), **arrays)
-        return name + ".npz"
+        return self._put(name + ".npz", lambda path: numpy.savez(path, **arrays))
+
+    def _put(self, name: str, write: Callable[[str], Any]) -> str:
+        """Write a file that appears whole or not at all, and only from the worker: a fork of it has another part."""
+        part = self.exchange / f"part-{os.getpid()}-{name}"
+        write(str(part))
+        self.channel.leave_if_forked()
+        part.replace(self.exchange / name)
+        return name
 
 
 def _read_npz(path: str) -> dict[str, Any]:

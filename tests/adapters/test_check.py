@@ -19,7 +19,7 @@ from bench.errors import BadOutput
 from bench.motion.clip import Clip
 from bench.motion.edit import crop
 from bench.motion.skeleton import Skeleton
-from tests.adapters.outside import COPY, left_behind, with_worker
+from tests.adapters.outside import COPY, by_hand, left_behind, with_worker
 from tests.motion.factory import person, random_clip
 
 TAKES = [
@@ -254,13 +254,20 @@ def test_outside_program_is_checked_and_stopped(tmp_path: Path) -> None:
 
 def test_outside_program_that_does_not_stop_fails_its_row(tmp_path: Path) -> None:
     code = """
-    import signal, time
-    def transfer(content, style):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        time.sleep(0.5)
-        return content
+    import shutil
+    folder = hello["exchange"] + "/"
+    while request["call"] == "transfer":
+        tasks = request["tasks"]
+        if len(tasks) > 4:
+            # It reads on, cancel included, and never answers: no clock decides when it is too late.
+            while True:
+                read()
+        for task in tasks:
+            shutil.copyfile(folder + task["content"]["file"], folder + task["answer"] + ".npz")
+        say({"id": request["id"], "ok": True, "files": [task["answer"] + ".npz" for task in tasks]})
+        request = read()
     """
-    adapter = with_worker(tmp_path, code, "[timeouts]\nstop_s = 0.1")
+    adapter = by_hand(tmp_path, code, "[timeouts]\nstop_s = 0.1")
     assert set(failures(adapter)) == {"honours cancellation"}
 
 

@@ -144,6 +144,30 @@ def test_forks_and_pools_do_not_answer_for_the_worker(folder: Path, shared_memor
     check_nothing_is_left(folder, shared_memory)
 
 
+def test_forks_in_answers_that_are_made_while_they_are_stored_write_nothing(folder: Path) -> None:
+    code = """
+    import os, time
+    worker = os.getpid()
+    class Late:
+        def __init__(self, values):
+            self.values = values
+        def __array__(self, dtype=None, copy=None):
+            os.fork()
+            is_fork = os.getpid() != worker
+            # Without a guard the fork's answer would replace the one that the worker has just written.
+            time.sleep(0.3 if is_fork else 0.2)
+            return self.values + 0.01 * is_fork
+    def transfer_batch(pairs):
+        return [(content.rotations_wxyz, Late(content.root_xyz_m)) for content, style in pairs]
+    """
+    method = with_worker(folder, code)()
+    pairs = [(content_take(seed=seed), style_take()) for seed in range(3)]
+    answers = method.transfer_batch(pairs, rngs=[rng()] * 3)
+    for answer, (content, _) in zip(answers, pairs, strict=True):
+        np.testing.assert_array_equal(answer.root_xyz_m, content.clip.root_xyz_m)
+    method.close()
+
+
 def test_answers_depend_on_the_seed_alone(folder: Path) -> None:
     code = """
     import random, numpy

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -72,6 +73,18 @@ def test_bvh_is_read_as_the_harness_wrote_it(tmp_path: Path) -> None:
     assert (motion.names, motion.parents, motion.fps) == (list(clip.skeleton.names), list(clip.skeleton.parents), 30)
     np.testing.assert_allclose(motion.offsets_m, clip.skeleton.offsets_m, atol=1e-9)
     np.testing.assert_allclose(motion.positions_m(), world_positions(clip), atol=1e-6)
+
+
+def test_a_file_that_is_being_written_has_another_name(tmp_path: Path) -> None:
+    def write(path: str) -> None:
+        assert list(tmp_path.iterdir()) == []
+        Path(path).write_text("half")
+        assert not (tmp_path / "a.npz").exists()
+
+    answering = worker.Worker(None, SimpleNamespace(leave_if_forked=lambda: None))  # type: ignore[arg-type]
+    answering.exchange = tmp_path
+    assert answering._put("a.npz", write) == "a.npz"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]
 
 
 @pytest.mark.parametrize("version", OLD_PYTHONS)
