@@ -21,7 +21,10 @@ import psutil
 
 POLL_S = 0.05
 PR_SET_CHILD_SUBREAPER = 36
-GRACE_S, GIVE_UP_S = 1.0, 10.0
+GRACE_S = 1.0
+INNER_GUARDS_S = 10.0
+"""A guard within needs a moment to start, to kill and to remove its folder; on a busy machine, more of it."""
+GIVE_UP_S = 10.0
 CANNOT_START = 127
 
 
@@ -63,9 +66,19 @@ def _adopt_orphans() -> None:
 
 def _wait_for_inner_guards() -> None:
     """What the program itself had guarded is cleaned up by those guards, if they are given a moment."""
-    deadline = time.monotonic() + GRACE_S
-    while _living_descendants() and time.monotonic() < deadline:
+    started = time.monotonic()
+    while alive := _living_descendants():
+        seconds = time.monotonic() - started
+        if seconds >= (INNER_GUARDS_S if any(map(_is_guard, alive)) else GRACE_S):
+            return
         time.sleep(POLL_S)
+
+
+def _is_guard(process: psutil.Process) -> bool:
+    try:
+        return __file__ in process.cmdline()
+    except psutil.Error:
+        return False
 
 
 def _kill_descendants() -> None:

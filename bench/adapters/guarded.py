@@ -146,7 +146,7 @@ def end_guarded(process: subprocess.Popen[bytes], lifeline: int, pump: threading
     """Let go of the lifeline: the guard kills what is left and leaves."""
     os.close(lifeline)
     try:
-        process.wait(guard.GIVE_UP_S + 5.0)
+        process.wait(guard.INNER_GUARDS_S + guard.GIVE_UP_S + 5.0)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()

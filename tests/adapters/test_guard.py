@@ -81,7 +81,9 @@ def test_programs_that_multiply_are_all_ended(tmp_path: Path) -> None:
     assert left_behind(tmp_path) == []
 
 
-def test_a_guard_within_a_guard_cleans_up_too(tmp_path: Path) -> None:
+@pytest.mark.parametrize("wait_s", [0.0, 0.5])
+def test_a_guard_within_a_guard_cleans_up_too(tmp_path: Path, wait_s: float) -> None:
+    """Also where it is so slow to start that it has not yet begun when the outer one ends."""
     inner = tmp_path / "inner"
     inner.mkdir()
     code = f"""
@@ -90,7 +92,7 @@ def test_a_guard_within_a_guard_cleans_up_too(tmp_path: Path) -> None:
     from bench.adapters.guarded import start_guarded
     command = [sys.executable, "-c", "import time; time.sleep(600)", sys.argv[1]]
     kept = start_guarded(command, Path({str(inner)!r}), working_folder=Path.cwd(), environment={{}})
-    time.sleep(0.5)
+    time.sleep({wait_s})
     print('ready', flush=True)
     time.sleep(600)
     """

@@ -149,8 +149,8 @@ def results(store: Path) -> set[tuple[str, str]]:
 
 
 def _wait_for_orphans(marker: str) -> None:
-    """Workers of killed runs end by themselves within seconds."""
-    deadline = time.monotonic() + 10.0
+    """Workers of killed runs end by themselves, on an idle machine within seconds."""
+    deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
         found = subprocess.run(["pgrep", "-f", marker], capture_output=True, text=True, check=False).stdout.split()
         if not found:
