@@ -47,7 +47,8 @@ def write_movie(player: PlayerTable, sample: int, bodies: Sequence[str], path: P
             panel.axhline(0.0, color="#CCCCCC", linewidth=0.8, zorder=0)
             bones.append([panel.plot([], [], color=SIDES[side], linewidth=2.2)[0] for side in player.sides[1:]])
         figure.suptitle(f"{player.samples[sample][0]}: {player.samples[sample][1]}", fontsize=9)
-        writer = PillowWriter(fps=round(player.fps)) if path.suffix.lower() == ".gif" else FFMpegWriter(round(player.fps))
+        make = PillowWriter if path.suffix.lower() == ".gif" else FFMpegWriter
+        writer = make(fps=round(player.fps))
         path.parent.mkdir(parents=True, exist_ok=True)
         with writer.saving(figure, str(path), dpi=90):
             for frame in range(max(len(body.positions_m[sample]) for body in shown)):

@@ -140,7 +140,7 @@ class EncoderBlock(nn.Module):
         self.shortcut = PointwiseMix(n_in, 2 * n_in, bias=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        carried = self.shortcut(self.pool(x))
+        carried: Tensor = self.shortcut(self.pool(x))
         deep = self.first(functional.leaky_relu(self.norms[0](x), LEAK))
         deep = self.second(functional.leaky_relu(self.norms[1](deep), LEAK))
         return (carried + deep) / math.sqrt(2.0)
@@ -171,7 +171,7 @@ class DecoderBlock(nn.Module):
         self.shortcut = PointwiseMix(n_in, n_out, bias=False)
 
     def forward(self, x: Tensor, style: Tensor) -> Tensor:
-        carried = self.unpool(self.shortcut(x))
+        carried: Tensor = self.unpool(self.shortcut(x))
         deep = self.first(functional.leaky_relu(self.norms[0](x, style), LEAK))
         deep = self.second(functional.leaky_relu(self.norms[1](deep, style), LEAK))
         return (carried + deep) / math.sqrt(2.0)
