@@ -143,7 +143,8 @@ class EncoderBlock(nn.Module):
         carried: Tensor = self.shortcut(self.pool(x))
         deep = self.first(functional.leaky_relu(self.norms[0](x), LEAK))
         deep = self.second(functional.leaky_relu(self.norms[1](deep), LEAK))
-        return (carried + deep) / math.sqrt(2.0)
+        joined: Tensor = (carried + deep) / math.sqrt(2.0)
+        return joined
 
 
 class Adain(nn.Module):
@@ -174,7 +175,8 @@ class DecoderBlock(nn.Module):
         carried: Tensor = self.unpool(self.shortcut(x))
         deep = self.first(functional.leaky_relu(self.norms[0](x, style), LEAK))
         deep = self.second(functional.leaky_relu(self.norms[1](deep, style), LEAK))
-        return (carried + deep) / math.sqrt(2.0)
+        joined: Tensor = (carried + deep) / math.sqrt(2.0)
+        return joined
 
 
 class Trunk(nn.Module):
