@@ -85,7 +85,9 @@ class ContentConfig:
 
     @property
     def size(self) -> NetworkSize:
-        return NetworkSize(N_INPUT, N_INPUT, 0, N_OUTPUT, self.hidden, self.style_hidden, self.mlp, every_layer=True)
+        return NetworkSize(
+            N_INPUT, N_INPUT, 0, N_OUTPUT, self.hidden, self.style_hidden, self.mlp, every_layer=True, linear=True
+        )
 
 
 CONFIGS = {

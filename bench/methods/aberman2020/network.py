@@ -7,14 +7,14 @@ has 1,409,900 weights and the discriminator 1,009,752.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from bench.methods.layers import adain
+from bench.methods.layers import adain, double_time
 
 LEAST_FRAMES = 16
 """Below this the reflected padding would be longer than what it pads."""
@@ -32,6 +32,8 @@ class NetworkSize:
     mlp : hidden layers between a style code and the numbers of AdaIN.
     every_layer : AdaIN after every convolution of the residual block, as the paper words it; the released code
         has it once, before the block.
+    linear : frames between those of a code are interpolated, not repeated as in the paper. Filters over repeated frames
+        can answer every second frame differently, which shakes.
     """
 
     content: int
@@ -42,18 +44,15 @@ class NetworkSize:
     style_hidden: int = 96
     mlp: tuple[int, ...] = (192, 256)
     every_layer: bool = False
+    linear: bool = False
 
     def narrowed(self, width: float) -> NetworkSize:
         """The same network with all inner channels multiplied by ``width``."""
-        return NetworkSize(
-            self.content,
-            self.style,
-            self.video,
-            self.output,
-            round(self.hidden * width),
-            round(self.style_hidden * width),
-            tuple(round(n * width) for n in self.mlp),
-            self.every_layer,
+        return replace(
+            self,
+            hidden=round(self.hidden * width),
+            style_hidden=round(self.style_hidden * width),
+            mlp=tuple(round(n * width) for n in self.mlp),
         )
 
 
@@ -132,11 +131,12 @@ class StyleMlp(nn.Module):
 
 
 class Decoder(nn.Module):
-    """AdaIN, a residual block, nearest-neighbour up-sampling and one convolution (section 4.3)."""
+    """AdaIN, a residual block, up-sampling to the nearest neighbour and one convolution (section 4.3)."""
 
     def __init__(self, size: NetworkSize) -> None:
         super().__init__()
         self.n_adain = 3 if size.every_layer else 1
+        self.linear = size.linear
         self.inner = nn.ModuleList([Conv(size.hidden, size.hidden, 8) for _ in range(2)])
         self.up = Conv(size.hidden, size.output, 8)
 
@@ -150,7 +150,9 @@ class Decoder(nn.Module):
             if self.n_adain > 1:
                 inner = adain(inner, shifts_scales[:, 1 + layer, 1], shifts_scales[:, 1 + layer, 0])
             inner = leaky(inner) if layer == 0 else inner
-        result: Tensor = self.up((x + inner).repeat_interleave(2, dim=2))
+        code: Tensor = x + inner
+        doubled = functional.interpolate(code, scale_factor=2, mode="linear") if self.linear else double_time(code)
+        result: Tensor = self.up(doubled)
         return result
 
 

@@ -71,12 +71,12 @@ class ConvAdainConfig:
 
     @property
     def size(self) -> NetworkSize:
-        return NetworkSize(N_POSE, N_POSE, 0, N_POSE).narrowed(self.width)
+        return NetworkSize(N_POSE, N_POSE, 0, N_POSE, linear=True).narrowed(self.width)
 
 
 CONFIGS = {
     "smoke": ConvAdainConfig(width=0.1, n_steps=3, batch=4, rate=1e-3, average=0.5),
-    "small": ConvAdainConfig(width=0.5, n_steps=4000, batch=16, rate=1e-3, average=0.995),
+    "small": ConvAdainConfig(width=0.5, n_steps=2600, batch=16, rate=1e-3, average=0.995),
     "paper": ConvAdainConfig(),
 }
 
