@@ -92,10 +92,11 @@ def sentences(table: Table) -> list[str]:
     verdict = verdict_of(table)
     said = [_leading(table, column, verdict)]
     if verdict.transfers:
-        said.append(f"**Really transfer style** ({_beaten(verdict)}): {_names(verdict.transfers)}.")
+        done = "Really transfer style" if column.metric == "joint_recognition" else "Really better"
+        said.append(f"**{done}** ({_beaten(verdict)}): {_names(verdict.transfers)}.")
     if verdict.trick is not None and verdict.like_a_trick:
         trick = f"{escape_markdown(verdict.trick.title)} ({_value(column, verdict.trick)})"
-        said.append(f"**Do something, but not more than a simple trick**, {trick}: {_names(verdict.like_a_trick)}.")
+        said.append(f"**Better than nothing, but not than a simple trick**, {trick}: {_names(verdict.like_a_trick)}.")
     if verdict.does_nothing:
         said.append(f"**Not separable from doing nothing:** {_names(verdict.does_nothing)}.")
     if verdict.copying_methods:
