@@ -26,6 +26,7 @@ from bench.adapters.kuriyama2022 import KURIYAMA
 from bench.adapters.mason2022 import MASON_2022
 from bench.adapters.motion_puzzle import MOTION_PUZZLE
 from bench.adapters.oracles import LabelOracle, ProceduralTruth, RealDisjoint, RealTest
+from bench.adapters.style_erd import STYLE_ERD
 
 _TABLE: tuple[type[Adapter], ...] = (
     RealTest,
@@ -54,6 +55,7 @@ _TABLE: tuple[type[Adapter], ...] = (
     Aberman2020Content,
     Conv1dAdain,
     *MOTION_PUZZLE,
+    *STYLE_ERD,
     *KURIYAMA,
     *MASON_2022,
 )

@@ -7,6 +7,8 @@ mean bones, whoever moves.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor, nn
 
@@ -23,7 +25,24 @@ N_POSITIONS = 3 * (N_JOINTS - 1)
 N_CONTACTS = len(FOOT_JOINTS)
 
 
-class Frames(nn.Module):
+class Frames(NamedTuple):
+    """Frames as numbers.
+
+    Attributes
+    ----------
+    motion : ``[B, T, 84 + 60 + 60]`` rotations, positions and velocities.
+    contacts : ``[B, T, 4]``, 1 where a foot joint stands.
+    heading : ``[B, T, 4]`` the facing that was taken out, as a rotation about the up axis.
+    last : ``[B, 1, 72]`` what the frame after the last one has to know of it.
+    """
+
+    motion: Tensor
+    contacts: Tensor
+    heading: Tensor
+    last: Tensor
+
+
+class FrameReader(nn.Module):
     """World motion to the numbers of each frame.
 
     Attributes
@@ -40,45 +59,33 @@ class Frames(nn.Module):
         self.register_buffer("reference_wxyz", torch.tensor([1.0, 0.0, 0.0, 0.0]).repeat(N_JOINTS, 1))
         self.register_buffer("offsets", torch.zeros(N_JOINTS, 3))
 
-    def forward(
-        self, rotations_wxyz: Tensor, root_xyz_m: Tensor, before: Tensor | None = None
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Rotations ``[B, T, 84]``, positions and velocities ``[B, T, 60]``, contacts ``[B, T, 4]``.
+    def forward(self, rotations_wxyz: Tensor, root_xyz_m: Tensor, before: Tensor | None = None) -> Frames:
+        """Read frames in their order.
 
         Parameters
         ----------
         rotations_wxyz : ``[B, T, 21, 4]``. root_xyz_m : ``[B, T, 3]``.
-        before : what :meth:`kept` gave for the frame before the first; None where there was none, then it stands still.
+        before : ``last`` of the frames before these; None where there were none, then the first one stands still.
         """
-        local, heading, positions = self.facing(rotations_wxyz, root_xyz_m)
-        feet = (
-            rotations.rotate(heading[..., None, :], positions[..., FOOT_JOINTS, :]) + root_xyz_m[..., None, :] / UNIT_M
-        )
-        places = positions[..., 1:, :].flatten(2)
-        last = self.kept(rotations_wxyz[:, :1], root_xyz_m[:, :1]) if before is None else before
-        earlier = torch.cat([last, torch.cat([places, feet.flatten(2)], dim=2)[:, :-1]], dim=1)
-        moved = (feet.flatten(2) - earlier[..., N_POSITIONS:]).unflatten(2, (N_CONTACTS, 3))  # type: ignore[no-untyped-call]
-        contacts = (moved.square().sum(dim=-1) < CONTACT_SQUARED_UNITS).float()
-        return local.flatten(2), places, places - earlier[..., :N_POSITIONS], contacts
-
-    def kept(self, rotations_wxyz: Tensor, root_xyz_m: Tensor) -> Tensor:
-        """What the next frame needs of a frame ``[B, 1, ...]``: positions and feet, ``[B, 1, 72]``."""
-        _, heading, positions = self.facing(rotations_wxyz, root_xyz_m)
-        feet = (
-            rotations.rotate(heading[..., None, :], positions[..., FOOT_JOINTS, :]) + root_xyz_m[..., None, :] / UNIT_M
-        )
-        return torch.cat([positions[..., 1:, :].flatten(2), feet.flatten(2)], dim=2)
-
-    def facing(self, rotations_wxyz: Tensor, root_xyz_m: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Local rotations without heading ``[B, T, 21, 4]``, headings ``[B, T, 4]``, positions ``[B, T, 21, 3]``."""
-        still = torch.zeros_like(root_xyz_m)
-        yaw = facing_yaw(rotations.forward_kinematics(rotations_wxyz, still, self.offsets))
-        heading = rotations.about_y(yaw)
-        root = rotations.multiply(rotations.conjugate(heading), rotations_wxyz[..., 0, :])
+        world = self.positions(rotations_wxyz)
+        heading = rotations.about_y(facing_yaw(world))
+        back = rotations.conjugate(heading)
+        root = rotations.multiply(back, rotations_wxyz[..., 0, :])
         local = torch.cat([root[..., None, :], rotations_wxyz[..., 1:, :]], dim=-2)
-        sign = torch.where((local * self.reference_wxyz).sum(dim=-1, keepdim=True) < 0.0, -1.0, 1.0)
-        local = local * sign
-        return local, heading, rotations.forward_kinematics(local, still, self.offsets)
+        local = torch.where((local * self.reference_wxyz).sum(dim=-1, keepdim=True) < 0.0, -local, local)
+        feet = world[..., FOOT_JOINTS, :] + root_xyz_m[..., None, :] / UNIT_M
+        places = rotations.rotate(back[..., None, :], world[..., 1:, :]).flatten(2)
+        now = torch.cat([places, feet.flatten(2)], dim=2)
+        moved = now - torch.cat([now[:, :1] if before is None else before, now[:, :-1]], dim=1)
+        feet_moved = moved[..., N_POSITIONS:].reshape(*moved.shape[:2], N_CONTACTS, 3)
+        contacts = (feet_moved.square().sum(dim=-1) < CONTACT_SQUARED_UNITS).to(moved)
+        motion = torch.cat([local.flatten(2), places, moved[..., :N_POSITIONS]], dim=2)
+        return Frames(motion, contacts, heading, now[:, -1:])
+
+    def positions(self, rotations_wxyz: Tensor) -> Tensor:
+        """Joints of the mean body about its root, ``[..., 21, 4] -> [..., 21, 3]``, in the paper's unit."""
+        still = torch.zeros_like(rotations_wxyz[..., 0, :3])
+        return rotations.forward_kinematics(rotations_wxyz, still, self.offsets)
 
 
 def facing_yaw(positions: Tensor) -> Tensor:

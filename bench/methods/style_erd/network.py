@@ -12,9 +12,6 @@ from typing import TypeAlias
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
-
-from bench.methods import rotations
 
 State: TypeAlias = tuple[Tensor, Tensor]
 """Hidden and cell state of one branch, ``[layers, B, hidden]`` each."""
@@ -33,6 +30,8 @@ class Shape:
     hidden : of the latent code and the LSTMs.
     neutral_layers, style_layers : 6 and 4 in the paper, 4 and 6 in the released code.
     learned_states : initial states are parameters; False is the ablation with zeros.
+    decoder_labels : the decoder sees the target style; in the released code its input for it is zero.
+    residual : not in the paper: what is decoded is added to the frame's rotations.
     """
 
     n_rotations: int
@@ -43,6 +42,8 @@ class Shape:
     neutral_layers: int = 6
     style_layers: int = 4
     learned_states: bool = True
+    decoder_labels: bool = True
+    residual: bool = False
 
     @property
     def n_motion(self) -> int:
@@ -52,15 +53,20 @@ class Shape:
 class Branch(nn.Module):
     """A stack of LSTM layers with one learned initial state for each of some labels."""
 
+    states: Tensor
+
     def __init__(self, shape: Shape, layers: int, n_states: int) -> None:
         super().__init__()
         self.lstm = nn.LSTM(shape.hidden, shape.hidden, layers, batch_first=True)
         states = torch.zeros(2, layers, n_states, shape.hidden)
-        self.states = nn.Parameter(states, requires_grad=shape.learned_states)
+        if shape.learned_states:
+            self.states = nn.Parameter(states)
+        else:
+            self.register_buffer("states", states)
 
     def initial(self, labels: Tensor) -> State:
-        """The states with which sequences of labels ``[B]`` begin."""
-        hidden, cell = self.states[:, :, labels]
+        """The states with which sequences of label weights ``[B, n_states]`` begin."""
+        hidden, cell = torch.einsum("bn,klnh->klbh", labels, self.states)
         return hidden.contiguous(), cell.contiguous()
 
     def forward(self, latent: Tensor, state: State) -> tuple[Tensor, State]:
@@ -70,7 +76,11 @@ class Branch(nn.Module):
 
 
 class StyleErd(nn.Module):
-    """The generator: encode a frame, add a style's residual to the neutral branch, decode (section 3.1)."""
+    """The generator: encode a frame, add a style's residual to the neutral branch, decode (section 3.1).
+
+    Contents ``[B, n_contents]`` are one-hot. Styles ``[B, n_styles]`` are weights without the neutral one, which is all
+    zeros: one-hot for a style, less than 1 for its intensity, several for a mixture (section 4.4).
+    """
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
@@ -93,23 +103,21 @@ class StyleErd(nn.Module):
         self.rotation_layer = nn.Linear(inner[3], shape.n_rotations)
         self.velocity_layer = nn.Linear(inner[3], shape.n_positions)
 
-    def encode(self, motion: Tensor, contacts: Tensor, contents: Tensor, source_style: Tensor) -> Tensor:
-        """z_t: motion ``[B, T, R + 2P]``, contacts ``[B, T, 4]``, content indices ``[B]``, styles ``[B, n_styles]``."""
-        n_frames = motion.shape[1]
-        content = functional.one_hot(contents, self.shape.n_contents).to(motion)
-        labels = torch.cat([content, source_style], dim=1)[:, None].expand(-1, n_frames, -1)
-        code: Tensor = self.encoder(torch.cat([motion, contacts, labels], dim=2))
+    def encode(self, motion: Tensor, contacts: Tensor, contents: Tensor, source_styles: Tensor) -> Tensor:
+        """z_t ``[B, T, hidden]`` of motion ``[B, T, R + 2P]`` and contacts ``[B, T, 4]``."""
+        labels = torch.cat([source_styles, contents], dim=1)[:, None].expand(-1, motion.shape[1], -1)
+        code: Tensor = self.encoder(torch.cat([motion, labels, contacts], dim=2))
         return code
 
     def initial(self, contents: Tensor) -> list[State]:
-        """States of the neutral branch and of every style's, for sequences of contents ``[B]``."""
-        first = torch.zeros_like(contents)
-        return [self.neutral.initial(contents), *(branch.initial(first) for branch in self.styles)]
+        """States of the neutral branch and of every style's, at the beginning of sequences."""
+        one = torch.ones_like(contents[:, :1])
+        return [self.neutral.initial(contents), *(_branch(style).initial(one) for style in self.styles)]
 
     def recur(self, code: Tensor, target: Tensor, states: Sequence[State]) -> tuple[Tensor, list[State]]:
         """z'_t = r_0(z_t) + sum of weight times r_S(z_t), and the states afterwards.
 
-        ``target`` ``[B, n_styles]`` are weights of styles, all 0 for neutral; branches that nobody wants do not run.
+        Branches that no sequence wants do not run, and their states stay.
         """
         result, after = self.neutral(code, states[0])
         following = [after, *states[1:]]
@@ -117,21 +125,25 @@ class StyleErd(nn.Module):
             wanted = torch.nonzero(target[:, style])[:, 0]
             if len(wanted) == 0:
                 continue
-            before = tuple(state[:, wanted].contiguous() for state in states[1 + style])
-            offset, (hidden, cell) = branch(code[wanted], before)
-            result = result.index_add(0, wanted, target[wanted, style, None, None] * offset)
-            following[1 + style] = tuple(
-                old.index_copy(1, wanted, new) for old, new in zip(states[1 + style], (hidden, cell), strict=True)
+            hidden, cell = states[1 + style]
+            offset, (new_hidden, new_cell) = branch(
+                code[wanted], (hidden[:, wanted].contiguous(), cell[:, wanted].contiguous())
             )
+            result = result.index_add(0, wanted, target[wanted, style, None, None] * offset)
+            following[1 + style] = (hidden.index_copy(1, wanted, new_hidden), cell.index_copy(1, wanted, new_cell))
         return result, following
 
     def decode(self, code: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-        """Unit quaternions ``[B, T, R]`` and velocities ``[B, T, P]``."""
-        labels = target[:, None].expand(-1, code.shape[1], -1)
-        hidden = self.decoder(torch.cat([code, labels], dim=2))
-        raw = self.rotation_layer(hidden)
-        unit = rotations.normalise(raw.reshape(*raw.shape[:2], -1, 4)).flatten(2)
-        return unit, self.velocity_layer(hidden)
+        """Raw rotations ``[B, T, R]`` and velocities ``[B, T, P]``."""
+        labels = target if self.shape.decoder_labels else torch.zeros_like(target)
+        hidden = self.decoder(torch.cat([code, labels[:, None].expand(-1, code.shape[1], -1)], dim=2))
+        return self.rotation_layer(hidden), self.velocity_layer(hidden)
+
+
+def _branch(module: nn.Module) -> Branch:
+    if not isinstance(module, Branch):
+        raise TypeError(f"expected a branch, got {type(module).__name__}")
+    return module
 
 
 def _convolution(in_channels: int, out_channels: int, kernel: int) -> nn.Conv1d:
@@ -170,7 +182,8 @@ class Discriminator(nn.Module):
             return torch.cat([neutral, style], dim=1).mul(classes).sum(dim=1)
         labels = self.labels(torch.cat([style, content], dim=1))
         weight = self.over_features(labels)[:, :, None] * self.over_time(labels)[:, None, :]
-        return (features * weight).sum(dim=(1, 2))
+        scores: Tensor = (features * weight).sum(dim=(1, 2))
+        return scores
 
 
 class ContentClassifier(nn.Module):
@@ -194,4 +207,5 @@ class ContentClassifier(nn.Module):
         for layer in self.layers:
             x = layer(x)
             maps.append(x)
-        return self.logits(x).mean(dim=2), maps
+        scores: Tensor = self.logits(x)
+        return scores.mean(dim=2), maps
