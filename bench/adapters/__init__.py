@@ -27,6 +27,7 @@ from bench.adapters.mason2022 import MASON_2022
 from bench.adapters.motion_puzzle import MOTION_PUZZLE
 from bench.adapters.oracles import LabelOracle, ProceduralTruth, RealDisjoint, RealTest
 from bench.adapters.style_erd import STYLE_ERD
+from bench.adapters.xia2015 import Xia2015
 
 _TABLE: tuple[type[Adapter], ...] = (
     RealTest,
@@ -56,6 +57,7 @@ _TABLE: tuple[type[Adapter], ...] = (
     Conv1dAdain,
     *MOTION_PUZZLE,
     *STYLE_ERD,
+    Xia2015,
     *KURIYAMA,
     *MASON_2022,
 )

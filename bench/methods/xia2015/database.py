@@ -45,13 +45,13 @@ class XiaConfig:
     takes_per_cell : of the fit part that make the database; 0 for all.
     """
 
-    neighbours: int = 48
+    neighbours: int = 96
     order: int = 2
     search_dims: int = 16
     pose_dims: int = 12
     bandwidth: float = 0.5
     ridge: float = 0.1
-    smoothness: float = 1.0
+    smoothness: float = 4.0
     candidates: int = 4
     takes_per_cell: int = 0
 
