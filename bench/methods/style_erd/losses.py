@@ -38,3 +38,12 @@ def critic(real_scores: Tensor, fake_scores: Tensor) -> Tensor:
 def perceptual(made: Sequence[Tensor], wanted: Sequence[Tensor]) -> Tensor:
     """Equation 7: mean squared difference of feature maps, summed over the layers of the content classifier."""
     return torch.stack([squared(a, b) for a, b in zip(made, wanted, strict=True)]).sum()
+
+
+def disagreement(motion: Tensor) -> Tensor:
+    """Not in the paper: how far velocities are from differences of positions, ``[B, T, 2 P]`` of both.
+
+    The decoder gives velocities beside rotations; nothing else in the losses says that they are of one motion.
+    """
+    positions, velocities = motion.chunk(2, dim=2)
+    return squared(positions[:, 1:] - positions[:, :-1], velocities[:, 1:])

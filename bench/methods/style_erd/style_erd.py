@@ -31,7 +31,7 @@ from classifiers.data import mean_rotations
 NEUTRAL_STYLES = ("neutral", "normal")
 ROOT = slice(N_ROTATIONS, N_ROTATIONS + 3)
 SEEN = slice(N_ROTATIONS + 3, N_ROTATIONS + 5)
-ROTATION_END, POSITION_END = N_ROTATIONS, N_ROTATIONS + N_POSITIONS
+POSITION_START, VELOCITY_START = N_ROTATIONS, N_ROTATIONS + N_POSITIONS
 CRITIC_INPUT = slice(N_ROTATIONS, None)
 GRADIENT_CLIP = 5.0
 
@@ -47,6 +47,7 @@ class StyleErdConfig:
     decoder_labels : off in the released code.
     rotation, position, velocity : weights within the reconstruction loss (eq. 3).
     adversarial, perceptual, penalty : weights of losses; 0 leaves a loss out.
+    agreement : not in the paper: weight of the difference between decoded velocities and those of the positions.
     withheld : share of sources whose style label the encoder does not get in training: a stream has none.
     neutral_share : of the sources; every other one is transferred to neutral.
     decay : of the averaged weights; 0 keeps the last ones.
@@ -74,6 +75,7 @@ class StyleErdConfig:
     adversarial: float = 1.0
     perceptual: float = 0.1
     penalty: float = 128.0
+    agreement: float = 0.0
     classifier_steps: int = 4000
     withheld: float = 0.5
     neutral_share: float = 0.5
@@ -111,7 +113,7 @@ BUDGET_CHANGES: Mapping[str, Mapping[str, float]] = {
     "smoke": {"n_steps": 3, "batch": 4, "stride": 16, "classifier_steps": 3},
     "small": {
         "n_steps": 5000, "stride": 8, "rate": 1e-3, "discriminator_rate": 5e-4, "classifier_steps": 400,
-        "decay": 0.995,
+        "decay": 0.995, "penalty": 16.0, "agreement": 1.0,
     },
 }  # fmt: skip
 """Fields in which a budget differs from the paper's."""
@@ -264,9 +266,9 @@ class StyleErdTraining(Trainable):
         losses |= {
             "rotation": equations.quaternion_angle(rebuilt[..., :N_ROTATIONS], source[..., :N_ROTATIONS]),
             "position": equations.squared(
-                rebuilt[..., ROTATION_END:POSITION_END], source[..., ROTATION_END:POSITION_END]
+                rebuilt[..., POSITION_START:VELOCITY_START], source[..., POSITION_START:VELOCITY_START]
             ),
-            "velocity": equations.squared(rebuilt[..., POSITION_END:], source[..., POSITION_END:]),
+            "velocity": equations.squared(rebuilt[..., VELOCITY_START:], source[..., VELOCITY_START:]),
         }
         if config.adversarial > 0.0:
             self.discriminator.requires_grad_(False)
@@ -276,6 +278,8 @@ class StyleErdTraining(Trainable):
             maps = self.classifier(self.network.scale(torch.cat([made, source])))[1]
             halves = [layer.chunk(2) for layer in maps]
             losses["perceptual"] = equations.perceptual([a for a, _ in halves], [b for _, b in halves])
+        if config.agreement > 0.0:
+            losses["agreement"] = equations.disagreement(torch.cat([made, rebuilt])[..., POSITION_START:])
         if self.supervision is not None:
             losses |= self.supervision(made[..., :N_ROTATIONS], rows, target)
         named = [name for name in losses if name not in ("critic", "penalty")]
