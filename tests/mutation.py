@@ -1,4 +1,4 @@
-"""Are the metrics under test? ``python -m tests.mutation [NAME ...] [--verbose]``
+"""Are the metrics under test? ``python -m tests.mutation [NAME ...] [--verbose] [--page docs/metrics/mutation.md]``
 
 Walks METRICS. Of every metric two results are changed in turn: what its pure functions return and what the record of a
 row says. Each is doubled, negated and made one larger (booleans: all true, all opposite, one place further), and the
@@ -294,10 +294,37 @@ def hunt(metrics: Sequence[str]) -> Hunt:
     return found
 
 
+def page(names: Sequence[str], found: Hunt) -> str:
+    """The result as Markdown."""
+    survived = sum(not killer for killer in found.killers.values())
+    lines = [
+        "# Metrics under test: the mutation check",
+        "",
+        "Written by `python -m tests.mutation --page docs/metrics/mutation.md`; do not edit.",
+        "",
+        "Of every metric the results of its functions and the number in a row's record are changed in turn: doubled,",
+        "negated, made one larger (booleans: all true, all opposite, one place further). Each change must turn a test",
+        "red. The changes of what a method declares or a clock measures are those of the record alone.",
+        "",
+        f"{len(found.mutants)} changes of {len(names)} metrics, **{survived} that no test sees**. Functions shared by",
+        "several metrics are counted with each.",
+        "",
+        "| metric | changes | seen | functions |",
+        "|---|---|---|---|",
+    ]
+    for name in names:
+        mutants = mutants_of(name)
+        seen = sum(bool(found.killers[mutant]) for mutant in mutants)
+        functions = ", ".join(f"`{target.replace(':', '.')}`" for target in FUNCTIONS[name])
+        lines.append(f"| `{name}` | {len(mutants)} | {seen} | {functions} |")
+    return "\n".join(lines) + "\n"
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("metrics", nargs="*", metavar="NAME", help="rows of METRICS; default: all")
     parser.add_argument("--verbose", action="store_true", help="print the test that sees each change")
+    parser.add_argument("--page", type=Path, help="also write the result as a page")
     arguments = parser.parse_args()
     names = arguments.metrics or list(METRICS)
     unknown = sorted(set(names) - set(METRICS))
@@ -310,6 +337,8 @@ def main() -> int:
         print(f"{name:32s} {len(mutants) - len(survivors):2d} of {len(mutants):2d} changes turn a test red")
         for mutant in mutants if arguments.verbose else survivors:
             print(f"    {mutant.target} {mutant.change}: {found.killers[mutant] or 'SURVIVED'}")
+    if arguments.page:
+        arguments.page.write_text(page(names, found), encoding="utf-8")
     survived = sum(not killer for killer in found.killers.values())
     print(f"{len(found.mutants)} changes of {len(names)} metrics, {survived} survived")
     return int(survived > 0)
