@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -41,12 +41,16 @@ CANCELLED_AFTER_S = (0.0, 0.5)
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """One task of the check: a source window, a style reference, the style's label."""
+    """One task of the check: a source window, a style reference, the style's label.
+
+    ``source_style_label`` is for the source where it is one of the styles of a mixture.
+    """
 
     content: Take
     style: Take
     style_label: str
     content_label: str | None
+    source_style_label: str | None
     seed: int
 
     @property
@@ -137,6 +141,7 @@ def make_examples(adapter: type[Adapter], takes: Sequence[Take]) -> list[Example
                 style.hidden(content=False, style=traits.needs_style_label),
                 str(style.style),
                 content.content if traits.needs_content_label else None,
+                content.style if traits.needs_style_label else None,
                 SEED + number,
             )
         )
@@ -152,7 +157,7 @@ def fit_takes(takes: Sequence[Take]) -> list[Take]:
 
 
 def _half(example: Example) -> list[tuple[Take, float]]:
-    return [(replace(example.content, content=None), 0.5), (example.style, 0.5)]
+    return [(Take(example.content.clip, style=example.source_style_label), 0.5), (example.style, 0.5)]
 
 
 def _failed(name: str, expected: str, error: Exception, remedy: str = "") -> CheckRow:

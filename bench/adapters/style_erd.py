@@ -80,7 +80,7 @@ class StyleErdContent(StyleErd):
     title = "Style-ERD 2022 + own classifiers"
     description = "Style-ERD with residual rotations, any pairs and cross entropies of own fit-part classifiers"
     variant: ClassVar[Mapping[str, Any]] = {
-        "any_pairs": True, "residual": True, "content_class": 0.5, "style_class": 0.5, "n_frames": 48, "stride": 8,
+        "any_pairs": True, "residual": True, "content_class": 0.5, "style_class": 0.5, "n_frames": 32,
     }  # fmt: skip
 
 
