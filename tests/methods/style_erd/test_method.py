@@ -189,6 +189,13 @@ def test_intensity_and_mixtures(fitted: StyleErd, takes: list[Take]) -> None:
     assert by_takes.n_frames == 20
 
 
+def test_weights_are_intensities_and_neutral_is_the_rest(fitted: StyleErd) -> None:
+    network = fitted.network
+    assert network.style_weights([("old", 0.25), ("neutral", 0.75)]).tolist() == [[0.25, 0.0]]
+    assert network.style_weights([("old", 0.5), ("proud", 0.5)]).tolist() == [[0.5, 0.5]]
+    assert network.content_weights("walk").tolist() == [[0.0, 1.0]]
+
+
 def test_a_style_that_was_not_trained_is_refused_and_a_content_is_not(fitted: StyleErd) -> None:
     clip = random_clip(10)
     with pytest.raises(BadInput, match="knows the styles neutral, old, proud, got 'angry'"):
