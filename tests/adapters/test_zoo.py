@@ -11,6 +11,7 @@ import pytest
 
 from bench.suite.workers import Limits
 from reports.records import Record
+from tests.adapters.outside import with_worker
 from tests.suite.conftest import undisturbed as undisturbed
 from tests.suite.tiny import METHODS, contents, tiny_run
 
@@ -51,6 +52,9 @@ ZOO: dict[str, tuple[str, str, str]] = {
     "Segfaults": ("os.kill(os.getpid(), signal.SIGSEGV)", "failed", "killed by SIGSEGV"),
     "InfiniteLoop": ("while True: pass", "timeout", "no answer within"),
     "Sleeps": ("time.sleep(600)", "timeout", "no answer within"),
+    "ReturnsLate": ("time.sleep(30)", "timeout", "no answer within"),
+    "NeverStopsTalking": ("while True: sys.stdout.write('x' * 65536 + chr(10))", "timeout", "no answer within"),
+    "NeverStopsComplaining": ("while True: sys.stderr.write('y' * 65536)", "timeout", "no answer within"),
     "Allocates2GB": ("self.kept = np.ones(2**28)\ntime.sleep(600)", "oom", "the limit is"),
     "Leaks": ("self.kept = getattr(self, 'kept', []) + [np.ones(2**26)]\ntime.sleep(0.3)", "oom", "the limit is"),
     "IsNaN": ("return clip.with_motion(rotations, root * np.nan)", "invalid", "must be finite"),
@@ -78,6 +82,8 @@ ZOO: dict[str, tuple[str, str, str]] = {
 
 HARMLESS = {
     "Floods": "sys.stdout.write('x' * 10**6)\nsys.stderr.write('y' * 10**6)",
+    "HasManyChildren": "for _ in range(20): subprocess.Popen(['sleep', '1234.5'])",
+    "LeaksSlowly": "self.kept = getattr(self, 'kept', []) + [np.ones(5 * 2**17)]",
     "Forks": "subprocess.Popen(['sleep', '1234.5'], start_new_session=True)",
     "ForksAndComesBack": "if os.fork() == 0: time.sleep(0.01)",
     "IgnoresSigterm": "signal.signal(signal.SIGTERM, signal.SIG_IGN)",
@@ -91,6 +97,30 @@ AT_IMPORT = {
     "raises": ("raise OSError('no weights')", "OSError: no weights"),
     "leaves": ("import os\nos._exit(3)", "ended without a word"),
 }
+OUTSIDE: dict[str, tuple[str, str, str]] = {
+    "outside-good": ("", "ok", ""),
+    "outside-forks": ("if os.fork() == 0: time.sleep(0.01)", "ok", ""),
+    "outside-crashes": ("state.append(1)\nif len(state) == 5: raise RuntimeError('clip 5')", "failed", "clip 5"),
+    "outside-dies": ("state.append(1)\nif len(state) == 5: os._exit(7)", "failed", "exit code 7"),
+    "outside-cannot-be-stopped": (
+        "for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP): signal.signal(number, signal.SIG_IGN)\n"
+        "subprocess.Popen(['sleep', '1234.5'], start_new_session=True)\n"
+        "while True: pass", "timeout", "no answer within",
+    ),
+    "outside-closes-its-pipes": ("os.closerange(0, 256)", "failed", "during 'transfer'"),
+    "outside-deletes-its-exchange": ("shutil.rmtree(os.path.dirname(content.path))", "failed", "FileNotFoundError"),
+    "outside-is-nan": ("return content.rotations_wxyz * float('nan'), content.root_xyz_m", "invalid", "finite"),
+    "outside-cuts": ("return content.rotations_wxyz[1:], content.root_xyz_m[1:]", "invalid", "expected 64 frames"),
+}  # fmt: skip
+"""The same, of programs behind ``worker.py``."""
+
+PROGRAM = """
+import os, shutil, signal, subprocess, time
+state = []
+def transfer(content, style):
+{body}
+    return content
+"""
 LIMITS = Limits(wall_s=25.0, rss_mb=1500.0)
 
 
@@ -102,7 +132,12 @@ def write_zoo(folder: Path) -> list[str]:
         (folder / f"{name}.py").write_text(HEAD.format(name=name, body=indented) + OPEN)
     for name, (text, _) in AT_IMPORT.items():
         (folder / f"{name}.py").write_text(text + "\n" + HEAD.format(name=name, body="        pass"))
-    return [str(path) for path in sorted(folder.glob("*.py"))]
+    for name, (body, _, _) in OUTSIDE.items():
+        (folder / name).mkdir()
+        with_worker(folder / name, PROGRAM.format(body="\n".join(f"    {line}" for line in body.splitlines())))
+        toml = folder / name / "adapter.toml"
+        toml.write_text(toml.read_text().replace('"outside"', f'"{name}"'))
+    return [str(path) for path in (*sorted(folder.glob("*.py")), *sorted(folder.glob("*/adapter.toml")))]
 
 
 def descendants() -> set[int]:
@@ -121,7 +156,7 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Record], 
         patch.setenv("TMPDIR", str(scratch))
         patch.setattr(tempfile, "tempdir", None)
         result = tiny_run(folder / "out", folder / "store", adapter_files=options, limits=LIMITS, jobs=2)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while (descendants() - before or list(scratch.glob("stylebench-*"))) and time.monotonic() < deadline:
         time.sleep(0.2)
     assert not [p for p in descendants() - before if "resource_tracker" not in " ".join(psutil.Process(p).cmdline())]
@@ -144,6 +179,17 @@ def test_rude_rows_that_answer_are_scored(name: str, visit: tuple[dict[str, Reco
     records, _ = visit
     assert records[name].status == "ok", records[name].reason
     assert records[name].motions_digest == records["copy-content"].motions_digest
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_programs_say_why_or_are_scored(name: str, visit: tuple[dict[str, Record], Path]) -> None:
+    records, _ = visit
+    _, status, words = OUTSIDE[name]
+    assert (records[name].status, words in records[name].reason) == (status, True), records[name].reason
+    if status == "ok":
+        assert records[name].motions_digest == records["copy-content"].motions_digest
+    else:
+        assert not records[name].measurements
 
 
 @pytest.mark.parametrize("name", AT_IMPORT)
