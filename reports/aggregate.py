@@ -194,15 +194,12 @@ def sorted_rows(rows: Iterable[Row], metric: str, slice_name: str) -> list[Row]:
 
 def badness(row: Row, metric: str, slice_name: str) -> float:
     """A number that is lower for better rows, infinite where the value is undefined."""
-    found = estimate(row, metric, slice_name)
-    if found is None or found.value is None:
+    found = row.measurements(metric, slice_name)
+    values = [measurement.value for measurement in found if measurement.value is not None]
+    if not values:
         return float("inf")
-    return {
-        "higher": -found.value,
-        "lower": found.value,
-        "one": abs(found.value - 1.0),
-        "none": 0.0,
-    }[found.better]
+    value, _ = mean_and_sd(values)
+    return {"higher": -value, "lower": value, "one": abs(value - 1.0), "none": 0.0}[found[0].better]
 
 
 def variance_split(row: Row, metric: str, slice_name: str) -> VarianceSplit:
