@@ -26,6 +26,7 @@ from bench.adapters.kuriyama2022 import KURIYAMA
 from bench.adapters.mason2022 import MASON_2022
 from bench.adapters.motion_puzzle import MOTION_PUZZLE
 from bench.adapters.oracles import LabelOracle, ProceduralTruth, RealDisjoint, RealTest
+from bench.adapters.park2021 import PARK_2021
 from bench.adapters.style_erd import STYLE_ERD
 from bench.adapters.xia2015 import Xia2015
 
@@ -55,6 +56,7 @@ _TABLE: tuple[type[Adapter], ...] = (
     Aberman2020,
     Aberman2020Content,
     Conv1dAdain,
+    *PARK_2021,
     *MOTION_PUZZLE,
     *STYLE_ERD,
     Xia2015,

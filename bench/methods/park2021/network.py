@@ -123,7 +123,8 @@ class PointwiseMix(nn.Linear):
     """A 1 x 1 convolution, ``[B, C, T, V] -> [B, out, T, V]``."""
 
     def forward(self, x: Tensor) -> Tensor:
-        return super().forward(x.permute(0, 2, 3, 1)).permute(0, 3, 1, 2)
+        # contiguous, or torch would multiply in another order, and round differently, where weights need no gradient
+        return super().forward(x.permute(0, 2, 3, 1).contiguous()).permute(0, 3, 1, 2)
 
 
 class EncoderBlock(nn.Module):
@@ -207,12 +208,20 @@ class Stylizer(nn.Module):
         )
         self.leave = PointwiseMix(size.width, CHANNELS)
 
-    def forward(self, motion: Tensor, style: Tensor) -> Tensor:
-        x: Tensor = self.encoder(motion)
+    def encode(self, motion: Tensor) -> Tensor:
+        """Equation 2: ``[B, 7, T, 21] -> [B, 4 width, T / 4, 5]``."""
+        content: Tensor = self.encoder(motion)
+        return content
+
+    def decode(self, content: Tensor, style: Tensor) -> Tensor:
+        """Equation 3: ``[B, 4 width, T / 4, 5]`` and codes ``[B, style_dim]`` to ``[B, 7, T, 21]``."""
         for block in self.decoder:
-            x = block(x, style)
-        result: Tensor = self.leave(x)
+            content = block(content, style)
+        result: Tensor = self.leave(content)
         return result
+
+    def forward(self, motion: Tensor, style: Tensor) -> Tensor:
+        return self.decode(self.encode(motion), style)
 
 
 class Reader(nn.Module):
