@@ -23,6 +23,8 @@ from bench.trust_commands import ladder, trust
 if TYPE_CHECKING:
     from bench.suite.request import RunRequest
 
+FIGURE_FORMS = ("png", "pdf", "svg")
+
 app = typer.Typer(
     name="stylebench",
     help="Benchmark and evaluation harness for human-motion style transfer.",
@@ -326,11 +328,12 @@ def report(
 
     Example: stylebench report runs/latest
     """
-    from bench.suite.page import build_page
+    from bench.suite.page import build_page, save_figures
     from bench.suite.store import Store
 
-    failed = _report_run(run_folder, as_json, "", ("png", "pdf", "svg"))
+    failed = _report_run(run_folder, as_json, "", FIGURE_FORMS)
     page = build_page(run_folder, Store(store.absolute()))
+    save_figures(run_folder, Store(store.absolute()), FIGURE_FORMS)
     if not as_json:
         console.say(f"page: {page}")
     if failed:

@@ -75,7 +75,7 @@ def latencies(table: Table) -> go.Figure | None:
     """Median to slowest call frame by frame, a line a row; None where nothing was timed online."""
     found = []
     for row in table.rows:
-        values = [_measured(row, name, "online") for name in PERCENTILES]
+        values = [measured(row, name, "online") for name in PERCENTILES]
         if values[0] is not None:
             found.append((row.title, values))
     if not found:
@@ -203,6 +203,7 @@ def _value(row: TableRow, metric: str) -> float | None:
     return found[0].value if found else None
 
 
-def _measured(row: TableRow, metric: str, slice_name: str) -> float | None:
+def measured(row: TableRow, metric: str, slice_name: str) -> float | None:
+    """Mean of a measurement over a row's records; None where none has it."""
     values = [m.value for m in row.row.measurements(metric, slice_name) if m.value is not None]
     return float(np.mean(values)) if values else None

@@ -85,7 +85,6 @@ TABLE_2 = replace(
     summary="Table 2: duration of the next frame at 60 fps, parameters, numbers a style",
     needs="streams",
     fps=FPS,
-    metrics=tuple(metric for metric in RUNTIME.metrics if metric != "startup_designed"),
     facts={
         **{name: fact for name, fact in RUNTIME.facts.items() if name != "offline"},
         "online": "one frame in, one frame out; the first frame of a stream is not timed",

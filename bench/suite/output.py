@@ -12,6 +12,7 @@ import reports
 from bench.errors import BadConfig
 from reports.figures import interval_bars, recognition_scatter, save_figure
 from reports.heatmap import part_heatmap
+from reports.more_figures import latency_figure
 from reports.records import samples_path, write_text_atomically
 from reports.render import render
 from reports.rows import GroupKey, group_key, load_run
@@ -55,6 +56,8 @@ def _figures(table: Table) -> Iterator[tuple[str, Figure]]:
         yield "recognition", recognition_scatter(table)
     if "locality_msd" in shown:
         yield "joints", part_heatmap(table)
+    if table.key.track == "runtime" and any(_has(row, table.primary) for row in table.rows):
+        yield "latency", latency_figure(table)
     if any(_has(row, table.primary) for row in table.rows):
         yield "intervals", interval_bars(table)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bench.datasets.pack import Pack
@@ -28,11 +28,15 @@ from bench.suite.setting import read_tasks
 from bench.suite.store import Store
 from bench.suite.trust import motions_folders
 from reports import plots
-from reports.curves import TrainingCurves
+from reports.curves import TrainingCurves, loss_figure
+from reports.figures import save_figure
+from reports.ladder_figure import ladder_figure
+from reports.more_figures import confusion_figure
 from reports.page import Body, PlayerTable, Section, table_section, write_page
 from reports.plots import Plot, plot_of
 from reports.tables import Table, TableRow, tables_of_run
 from reports.trust import read_trust
+from reports.trust_figure import sample_size_figure
 
 N_SAMPLES = 30
 MOST_BODIES = 12
@@ -65,6 +69,29 @@ def build_page(run_folder: Path, store: Store) -> Path:
         *_plot_sections(run_folder, tables, store),
     ]
     return write_page(run_folder / "page", title, subtitle, [s for s in sections if s is not None], players)
+
+
+def save_figures(run_folder: Path, store: Store, forms: Sequence[str]) -> list[Path]:
+    """Write what belongs to no single table into ``run_folder/figures``: judges, distances, ladder, trainings."""
+    tables, paths = tables_of_run(run_folder), []
+    for name, figure in _static(run_folder, tables, store):
+        for form in forms:
+            paths.append(run_folder / "figures" / f"{name}.{form}")
+            save_figure(figure, paths[-1])
+    return paths
+
+
+def _static(run_folder: Path, tables: Sequence[Table], store: Store) -> Iterator[tuple[str, Figure]]:
+    for dataset, target, labels, counts in _cards(tables):
+        yield f"judges-{dataset}-{target}", confusion_figure(f"{target}, {dataset}", labels, counts)
+    stored = read_trust(TRUST) if TRUST.is_dir() else {}
+    shown = [stored[dataset] for dataset in sorted({table.key.dataset for table in tables} & set(stored))]
+    if shown:
+        yield "distances", sample_size_figure(shown)
+    if LADDER.is_dir():
+        yield "ladder", ladder_figure(all_cells(stored_rungs(LADDER)))
+    for number, (title, curves) in enumerate(_curves_of(run_folder, tables, store)):
+        yield f"training-{number}", loss_figure(title, [curves])
 
 
 def player_of(
@@ -190,16 +217,19 @@ def _distances(tables: Sequence[Table]) -> list[Plot]:
 
 
 def _confusions(tables: Sequence[Table]) -> list[Plot]:
-    found: list[Plot] = []
-    judged = sorted({table.key.dataset for table in tables if table.judges})
-    for dataset in judged:
-        if not (PRETRAINED / dataset / CARD_FILE).is_file():
-            continue
-        card = read_card(PRETRAINED / dataset)
-        for target, labels in (("content", card.content_labels), ("style", card.style_labels)):
-            figure = plots.confusion(labels, card.of(target)[0].pooled.confusion)
-            found.append(plot_of(f"confusion-{len(found)}", f"{target}, {dataset}", figure))
-    return found
+    return [
+        plot_of(f"confusion-{n}", f"{target}, {dataset}", plots.confusion(labels, counts))
+        for n, (dataset, target, labels, counts) in enumerate(_cards(tables))
+    ]
+
+
+def _cards(tables: Sequence[Table]) -> Iterator[tuple[str, str, Sequence[str], Sequence[Sequence[int]]]]:
+    """Dataset, target, labels and confusion of the first judge of each canonical card that the tables need."""
+    for dataset in sorted({table.key.dataset for table in tables if table.judges}):
+        if (PRETRAINED / dataset / CARD_FILE).is_file():
+            card = read_card(PRETRAINED / dataset)
+            for target, labels in (("content", card.content_labels), ("style", card.style_labels)):
+                yield dataset, target, labels, card.of(target)[0].pooled.confusion
 
 
 def _ladders() -> list[Plot]:
@@ -210,13 +240,17 @@ def _ladders() -> list[Plot]:
 
 
 def _trainings(run_folder: Path, tables: Sequence[Table], store: Store) -> list[Plot]:
+    return [
+        plot_of(f"training-{n}", title, plots.training([curves]))
+        for n, (title, curves) in enumerate(_curves_of(run_folder, tables, store))
+    ]
+
+
+def _curves_of(run_folder: Path, tables: Sequence[Table], store: Store) -> Iterator[tuple[str, TrainingCurves]]:
     fits: dict[str, str] = {}
     for table in tables:
         facts = read_inputs(run_folder, table.facts.get("tasks digest", "")) or {}
-        fits |= json.loads(json.dumps(facts.get("fits", {})))
-    found: list[Plot] = []
+        fits |= facts.get("fits", {})
     for title, key in sorted(fits.items()):
-        if store.has("fit", key) and (curves := read_curves(store.folder("fit", key), title)):
-            shown = TrainingCurves("", curves.names, curves.steps, curves.values)
-            found.append(plot_of(f"training-{len(found)}", title, plots.training([shown])))
-    return found
+        if store.has("fit", key) and (curves := read_curves(store.folder("fit", key), "")):
+            yield title, curves
