@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,14 +41,14 @@ class Leaner(Adapter):
 
 
 @pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> NightlyConfig:
+def small(tmp_path: Path) -> Iterator[NightlyConfig]:
     """The tiny benchmark with enough samples to tell rows apart."""
-    tiny.tiny_setup()
     name = "stylebench-transfer@1"
-    monkeypatch.setitem(PROTOCOLS, name, replace(PROTOCOLS[name], n_samples={"smoke": N_SAMPLES}))
     adapters = (str(tmp_path / "leaner.py"),)
     methods = ("copy-content", "noise-0.1")
-    return NightlyConfig(tmp_path / "nightly", ("tiny",), methods, adapters, profile="smoke", jobs=1)
+    with tiny.tiny_tables():
+        PROTOCOLS[name] = replace(PROTOCOLS[name], n_samples={"smoke": N_SAMPLES})
+        yield NightlyConfig(tmp_path / "nightly", ("tiny",), methods, adapters, profile="smoke", jobs=1)
 
 
 def one_night(config: NightlyConfig, number: int, *, noise: float, seed: int) -> nightly.NightResult:

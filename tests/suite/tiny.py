@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -48,22 +51,28 @@ def tiny_dataset() -> Dataset:
     return Dataset("tiny", "tiny@1", "tiny-1", tuple(takes), {c: c for c in CONTENTS}, "none", "this test")
 
 
-def tiny_setup() -> None:
-    """Put the tiny dataset, task lists of twelve and small judges into the tables of this process."""
-    DATASETS["tiny"] = DatasetEntry(lambda path, progress: tiny_dataset(), "tiny", "none", "none", needs_path=False)
+@contextmanager
+def tiny_tables() -> Iterator[None]:
+    """The tiny dataset, task lists of twelve and small judges in the tables of this process, while it lasts."""
     name = "stylebench-transfer@1"
-    PROTOCOLS[name] = replace(PROTOCOLS[name], n_samples={"smoke": 12, "quick": 12, "standard": 12})
     quick = JudgeRecipe(TrainingConfig(n_steps=60), TrainingConfig(n_steps=20))
-    judging.train_judges = partial(train_judges, seeds=(0,), recipe=quick)  # type: ignore[attr-defined]
+    protocol = replace(PROTOCOLS[name], n_samples={"smoke": 12, "quick": 12, "standard": 12})
+    with ExitStack() as stack:
+        tiny = DatasetEntry(lambda path, progress: tiny_dataset(), "tiny", "none", "none", needs_path=False)
+        stack.enter_context(mock.patch.dict(DATASETS, {"tiny": tiny}))
+        stack.enter_context(mock.patch.dict(PROTOCOLS, {name: protocol}))
+        stack.enter_context(mock.patch.dict(METRICS))
+        stack.enter_context(mock.patch.object(judging, "train_judges", partial(train_judges, seeds=(0,), recipe=quick)))
+        yield
 
 
 def tiny_run(out: Path, store: Path, versions: dict[str, int] | None = None, **options: Any) -> RunResult:
     """Run the tiny benchmark; ``versions`` raises the versions of metrics, ``options`` are those of the request."""
-    tiny_setup()
-    for metric, version in (versions or {}).items():
-        METRICS[metric] = replace(METRICS[metric], version=version)
     request = replace(RunRequest({"tiny": None}, out, store, METHODS, profile="smoke", jobs=1), **options)
-    return run(request, lambda *_: None)
+    with tiny_tables():
+        for metric, version in (versions or {}).items():
+            METRICS[metric] = replace(METRICS[metric], version=version)
+        return run(request, lambda *_: None)
 
 
 def contents(out: Path) -> dict[str, Any]:
