@@ -26,6 +26,7 @@ class SoftSwap(LearnedAdapter["KuriyamaConfig", "GestureTransfer"]):
     swap: ClassVar[str] = "soft"
     without: ClassVar[str] = ""
     """loss that is left out"""
+    positions: ClassVar[bool] = True
 
     def configs(self) -> type[KuriyamaConfig]:
         from bench.methods.kuriyama2022.method import KuriyamaConfig
@@ -42,10 +43,19 @@ class SoftSwap(LearnedAdapter["KuriyamaConfig", "GestureTransfer"]):
         from bench.methods.kuriyama2022.method import KuriyamaConfig, train_gestures
 
         losses = tuple(loss for loss in LOSSES if loss != self.without)
-        return train_gestures(KuriyamaConfig(swap=self.swap, losses=losses).at(request.budget), request)
+        return train_gestures(KuriyamaConfig(self.swap, losses, self.positions).at(request.budget), request)
 
     def transfer(self, content: Take, style: Take, *, rng: np.random.Generator) -> Clip:
         return self.network.transfer(content.clip, style.clip)
+
+
+class WithoutPositions(SoftSwap):
+    """Soft swap that finds style tokens by what they show, not by when; not in the paper."""
+
+    name = "kuriyama-soft-swap-no-positions"
+    title = "soft swap w/o position codes"
+    description = "soft swap without position codes, which otherwise answer the identity loss; not in the paper"
+    positions = False
 
 
 class HardSwap(SoftSwap):
@@ -113,6 +123,7 @@ class WithoutAppearance(SoftSwap):
 
 KURIYAMA = (
     SoftSwap,
+    WithoutPositions,
     HardSwap,
     AvatarNet,
     LatentAdain,

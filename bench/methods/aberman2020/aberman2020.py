@@ -82,6 +82,7 @@ class AbermanConfig:
     penalty: float = 10.0
     transfer_share: float = 0.5
     penalty_of_mean: bool = False
+    scaled_output: bool = False
 
     @property
     def size(self) -> NetworkSize:
@@ -91,7 +92,7 @@ class AbermanConfig:
 
 CONFIGS = {
     "smoke": AbermanConfig(width=0.1, n_steps=3, batch=4, stride=16),
-    "small": AbermanConfig(width=0.5, n_steps=2400, batch=16, rate=5e-4),
+    "small": AbermanConfig(width=0.5, n_steps=2400, batch=16, rate=5e-4, scaled_output=True),
     "paper": AbermanConfig(),
 }
 
@@ -106,6 +107,7 @@ class AbermanNetwork(nn.Module):
         self.content_scale = Standardise(size.content)
         self.style_scale = Standardise(size.style)
         self.video_scale = Standardise(max(size.video, 1))
+        self.output_scale = Standardise(size.output) if config.scaled_output else None
 
     def content_code(self, poses: Tensor) -> Tensor:
         """Poses ``[B, T, 148]`` to ``[B, hidden, T / 2]``."""
@@ -128,6 +130,8 @@ class AbermanNetwork(nn.Module):
     def decode(self, content_code: Tensor, style_code: Tensor) -> Tensor:
         """Raw rotations ``[B, T, 21, 4]``, not of unit length."""
         raw = self.generator.decode(content_code, style_code).transpose(1, 2)
+        if self.output_scale is not None:
+            raw = self.output_scale.inverse(raw)
         return raw.reshape(*raw.shape[:2], N_JOINTS, 4)
 
 
@@ -190,6 +194,8 @@ class AbermanTraining(Trainable):
         poses = windows.features
         self.network.content_scale.fit(torch.cat([poses[..., ROTATIONS], poses[..., ROOT]], dim=2), floor=1e-3)
         self.network.style_scale.fit(style_input(poses), floor=1e-3)
+        if self.network.output_scale is not None:
+            self.network.output_scale.fit(poses[..., ROTATIONS], floor=1e-2)
         if config.video:
             self.network.video_scale.fit(self._projected(poses), floor=1e-3)
         self.poses, self.offsets = poses.to(device), (windows.offsets_m / UNIT_M).to(device)

@@ -60,8 +60,8 @@ class ContentConfig:
     hidden, style_hidden, mlp : inner channels of the generator.
     n_frames, stride : of the training windows.
     n_steps, batch, rate, decay : Adam steps, their size and rate, and the averaging of weights.
-    reconstruction, cycle, matching, perceptual, content_class, style_class : weights of losses; the adversarial
-        loss has weight 1.
+    reconstruction, cycle, matching, perceptual, content_class, style_class, smoothness : weights of losses; the
+        adversarial loss has weight 1.
     classifier_steps : of each of the two classifiers.
     """
 
@@ -81,6 +81,7 @@ class ContentConfig:
     perceptual: float = 1.0
     content_class: float = 0.5
     style_class: float = 0.5
+    smoothness: float = 0.5
     classifier_steps: int = 250
 
     @property
@@ -168,6 +169,17 @@ def seen(wxyz: Tensor, height: Tensor, heading: Tensor, offsets: Tensor) -> Tens
     return torch.cat([rotations.forward_kinematics(turned, place, offsets[:, None]), turned], dim=3)
 
 
+def excess_jerk(made: Tensor, real: Tensor) -> Tensor:
+    """By how much, on a logarithmic scale, made motion is jerkier than real motion of its cell; 0 where it is calmer.
+
+    Parameters
+    ----------
+    made, real : ``[B, T, 21, 7]`` of :func:`seen`.
+    """
+    jerks = [torch.diff(view[..., :3], n=3, dim=1).norm(dim=-1).mean(dim=(1, 2)) for view in (made, real)]
+    return functional.relu(torch.log(jerks[0] / jerks[1].clamp(min=1e-9))).mean()
+
+
 def in_statures(offsets_m: Tensor) -> Tensor:
     """Bones ``[..., 21, 3]`` divided by the rest height of Head over the lower toe."""
     still = torch.zeros(*offsets_m.shape[:-1], 4)
@@ -249,6 +261,7 @@ class ContentTraining(Trainable):
             "perceptual": (kept - wanted).abs().mean(),
             "content_class": functional.cross_entropy(content_scores, contents.to(self.device)),
             "style_class": functional.cross_entropy(style_scores, other.to(self.device)),
+            "smoothness": excess_jerk(shown, self.view[real]),
         }
         total = sum((self._weight(name) * loss for name, loss in losses.items()), torch.zeros(()))
         self.generator_optimiser.zero_grad(set_to_none=True)
@@ -277,6 +290,7 @@ class ContentTraining(Trainable):
             "perceptual": config.perceptual,
             "content_class": config.content_class,
             "style_class": config.style_class,
+            "smoothness": config.smoothness,
         }[loss]
 
 

@@ -47,6 +47,7 @@ class KuriyamaConfig:
     ----------
     swap : how tokens or latents of the content are exchanged for the style's: one of SWAPS.
     losses : of the transformer, all with weight 1 (eq. 12).
+    positions : False leaves the position codes of eq. 2 out, see :class:`TransformerEncoder`; not in the paper.
     rate : of Adam, for both networks.
     autoencoder_steps, autoencoder_batch, autoencoder_frames : 1000 epochs over 1242 s in crops of 256 frames.
     transformer_steps, transformer_batch, transformer_frames : 1000 epochs over 63 pairs in crops of 1280 frames.
@@ -54,6 +55,7 @@ class KuriyamaConfig:
 
     swap: str = "soft"
     losses: tuple[str, ...] = LOSSES
+    positions: bool = True
     rate: float = 1e-4
     autoencoder_steps: int = 9000
     autoencoder_batch: int = 32
@@ -90,7 +92,7 @@ class GestureTransfer(nn.Module):
         super().__init__()
         self.config = config
         self.autoencoder = GestureAutoencoder()
-        self.transformer = StyleTransformer()
+        self.transformer = StyleTransformer(config.positions)
 
     def swapped(self, content: Tensor, style: Tensor) -> Tensor:
         """Latents of the output: ``[B, 16, F], [B, 16, G] -> [B, 16, F]`` with even F and G."""

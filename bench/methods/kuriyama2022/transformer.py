@@ -46,10 +46,17 @@ class Mlp(nn.Sequential):
 
 
 class TransformerEncoder(nn.Module):
-    """T_E: class token, positions (eq. 2), one pre-normalised layer of masked self-attention."""
+    """T_E: class token, positions (eq. 2), one pre-normalised layer of masked self-attention.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    with_positions : False leaves the position codes out. With them the identity loss is solved by matching the i-th
+        token with the i-th, whatever they show, and the style is then played as it is.
+    """
+
+    def __init__(self, with_positions: bool = True) -> None:
         super().__init__()
+        self.with_positions = with_positions
         self.class_token = nn.Parameter(torch.zeros(TOKEN_CHANNELS))
         self.before_attention = nn.LayerNorm(TOKEN_CHANNELS)
         self.attention = Attention()
@@ -60,7 +67,8 @@ class TransformerEncoder(nn.Module):
         """``[B, N, 64] -> class token [B, 64], encoded tokens [B, N, 64]``."""
         batch, n_tokens, _ = tokens.shape
         sequence = torch.cat([self.class_token.expand(batch, 1, -1), tokens], dim=1)
-        sequence = sequence + positions(n_tokens + 1).to(tokens)
+        if self.with_positions:
+            sequence = sequence + positions(n_tokens + 1).to(tokens)
         normed = self.before_attention(sequence)
         sequence = sequence + self.attention(normed, normed, near(n_tokens).to(tokens.device))
         sequence = sequence + self.mlp(self.before_mlp(sequence))
@@ -93,9 +101,9 @@ class TransformerDecoder(nn.Module):
 class StyleTransformer(nn.Module):
     """Encoder, decoder and the similarity of their tokens."""
 
-    def __init__(self) -> None:
+    def __init__(self, with_positions: bool = True) -> None:
         super().__init__()
-        self.encoder = TransformerEncoder()
+        self.encoder = TransformerEncoder(with_positions)
         self.decoder = TransformerDecoder()
 
     def similarity(self, content: Tensor, style: Tensor) -> Tensor:

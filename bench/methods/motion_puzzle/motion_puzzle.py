@@ -61,7 +61,7 @@ class PuzzleConfig:
         if budget == "smoke":
             return replace(self, channels=4, style_channels=8, steps=4, batch=4, rate=1e-3, average=0.5)
         if budget == "small":
-            return replace(self, channels=12, style_channels=24, steps=1000, batch=16, rate=2e-3, average=0.99)
+            return replace(self, channels=8, style_channels=16, steps=400, batch=8, rate=2e-3, average=0.99)
         return self
 
     @property

@@ -17,11 +17,13 @@ from bench.methods.aberman2020.aberman2020 import (
     CONFIGS,
     POSITIONS,
     ROOT,
+    ROTATIONS,
     AbermanTraining,
     encode,
     project,
     style_input,
 )
+from bench.methods.aberman2020.content import excess_jerk
 from bench.methods.aberman2020.losses import feature_distance, quaternion_norm, twist, with_differences
 from bench.methods.training import seeded
 from bench.methods.windows import cut_windows
@@ -176,3 +178,21 @@ def _turned(poses: Tensor, angle: float) -> Tensor:
 def test_the_style_encoder_reads_sixty_four_numbers() -> None:
     poses = torch.from_numpy(encode(random_clip(20)))[None]
     assert style_input(poses).shape == (1, 20, 64)
+
+
+def test_jerk_of_real_motion_costs_nothing_and_more_of_it_costs_its_logarithm() -> None:
+    motion = torch.randn(2, 16, 21, 7, generator=torch.Generator().manual_seed(0))
+    assert excess_jerk(motion, motion) == 0.0
+    assert excess_jerk(motion, 2.0 * motion) == 0.0
+    assert excess_jerk(3.0 * motion, motion) == pytest.approx(math.log(3.0), rel=1e-5)
+
+
+def test_scaled_output_is_told_in_deviations_from_the_mean_rotations() -> None:
+    network = training(scaled_output=True).network
+    windows = cut_windows(takes(), encode, n_frames=32, stride=16)
+    poses = windows.features[:3]
+    codes = network.content_code(poses), network.style_code(poses)
+    assert network.output_scale is not None
+    mean = windows.features[..., ROTATIONS].flatten(0, 1).mean(dim=0)
+    wanted = network.generator.decode(*codes).transpose(1, 2) * network.output_scale.deviation + mean
+    torch.testing.assert_close(network.decode(*codes).flatten(2), wanted, atol=1e-5, rtol=1e-5)
