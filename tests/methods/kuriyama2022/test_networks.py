@@ -25,6 +25,7 @@ from bench.methods.kuriyama2022.losses import (
 from bench.methods.kuriyama2022.tokens import latents_of, tokens_of
 from bench.methods.kuriyama2022.transformer import (
     StyleTransformer,
+    TransformerEncoder,
     avatar_net_swap,
     latent_adain,
     near,
