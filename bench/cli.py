@@ -17,6 +17,7 @@ from bench.command_options import RUNS, STORE, data_of, datasets_of, names_of, s
 from bench.data_commands import FpsOption, UnitOption, UpOption, data_app, overrides_of
 from bench.errors import BadConfig, BenchError
 from bench.nightly_command import nightly
+from bench.review_commands import table
 from bench.show_commands import movie, study, study_score
 from bench.trust_commands import ladder, trust
 
@@ -372,6 +373,7 @@ app.command()(study)
 app.command(name="study-score")(study_score)
 app.command()(ladder)
 app.command()(trust)
+app.command()(table)
 
 
 @app.command()

@@ -285,18 +285,25 @@ def to_latex(table: Table, part: Part = "main") -> str:
         whole = frame.reindex(columns=headers, fill_value="")
         lines += [_latex_line([str(cell) for cell in line]) for line in whole.itertuples(index=False)]
     lines += [r"\bottomrule", r"\end{tabular}"]
-    if notes:
-        lines += [
-            r"\begin{flushleft}\footnotesize",
-            *(escape_latex(note) + r"\\" for note in notes),
-            r"\end{flushleft}",
-        ]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *latex_notes(notes)]) + "\n"
+
+
+def latex_notes(notes: Sequence[str]) -> list[str]:
+    """Lines of a block of footnotes; empty without notes."""
+    if not notes:
+        return []
+    lines = [latex_cell(note) + r"\\" for note in notes]
+    return [r"\begin{flushleft}\footnotesize", *lines, r"\end{flushleft}"]
+
+
+def latex_cell(text: str) -> str:
+    """Text that LaTeX prints as it is, also at the start of a line of a table."""
+    # What starts with a bracket would be read as the optional argument of the line break before it.
+    return ("{}" if text.startswith("[") else "") + escape_latex(text)
 
 
 def _latex_line(cells: Sequence[str]) -> str:
-    # A cell that starts with a bracket would be read as the optional argument of the line break before it.
-    return " & ".join(("{}" if cell.startswith("[") else "") + escape_latex(cell) for cell in cells) + r" \\"
+    return " & ".join(latex_cell(cell) for cell in cells) + r" \\"
 
 
 def to_html(table: Table, part: Part = "main") -> str:
