@@ -17,7 +17,7 @@ from bench.command_options import RUNS, STORE, data_of, datasets_of, names_of, s
 from bench.data_commands import FpsOption, UnitOption, UpOption, data_app, overrides_of
 from bench.errors import BadConfig, BenchError
 from bench.nightly_command import nightly
-from bench.review_commands import table
+from bench.review_commands import diff, pack, reproduce, table, verify
 from bench.show_commands import movie, study, study_score
 from bench.trust_commands import ladder, trust
 
@@ -374,6 +374,10 @@ app.command(name="study-score")(study_score)
 app.command()(ladder)
 app.command()(trust)
 app.command()(table)
+app.command()(pack)
+app.command()(verify)
+app.command()(reproduce)
+app.command()(diff)
 
 
 @app.command()

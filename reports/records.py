@@ -158,6 +158,8 @@ class Record(_Strict):
     """windows, fps, switches, task-list digest: what a reader needs to rebuild the number"""
     motions_digest: str = ""
     samples_digest: str = ""
+    pack_digest: str = ""
+    """blake2b of the motion pack; empty where none was made"""
     provenance: Provenance
 
     @model_validator(mode="after")

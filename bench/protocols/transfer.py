@@ -97,7 +97,7 @@ TRANSFER = Protocol(
     summary="content window + style reference -> motion; content and style must both be right on the same sample",
     needs="transfers",
     fps=30.0,
-    n_samples={"smoke": 60, "quick": 1000, "standard": 2500},
+    n_samples={"smoke": 100, "quick": 1000, "standard": 2500},
     metrics=(
         "joint_recognition",
         "joint_recognition_ratio",

@@ -13,7 +13,7 @@ import shutil
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -143,7 +143,10 @@ def _fit_view(take: Take) -> Take:
 
 def _generate(job: Job, cell: GenerateJob, adapter: Adapter, pack: Pack, send: Send) -> None:
     tasks = read_tasks(Path(cell.tasks_file))
-    answer = answering(adapter, cell.track, cell.fps, pack, lambda: _world(job, pack))
+    answer = answering(
+        adapter, cell.track, cell.fps, pack,
+        lambda: world_of(job.dataset, pack, job.fit_take_ids, job.disjoint_take_ids),
+    )  # fmt: skip
 
     def write(folder: Path) -> dict[str, Any]:
         started, last_report, own = time.perf_counter(), 0.0, os.getpid()
@@ -166,9 +169,10 @@ def _generate(job: Job, cell: GenerateJob, adapter: Adapter, pack: Pack, send: S
     Store(Path(job.store)).put("motions", cell.key, write)
 
 
-def _world(job: Job, pack: Pack) -> World:
-    fit, disjoint = ([pack.take(take_id) for take_id in ids] for ids in (job.fit_take_ids, job.disjoint_take_ids))
-    if job.dataset != KNOWN_FOR:
+def world_of(dataset: str, pack: Pack, fit_take_ids: Sequence[str], disjoint_take_ids: Sequence[str]) -> World:
+    """What oracles know."""
+    fit, disjoint = ([pack.take(take_id) for take_id in ids] for ids in (fit_take_ids, disjoint_take_ids))
+    if dataset != KNOWN_FOR:
         return World(fit, disjoint, pack.by_id)
     from bench.datasets.procedural import imitated, true_answer
 

@@ -20,6 +20,8 @@ SECONDS_PER_1000_SAMPLES = {"generate": 6.0, "score": 14.0}
 """Rough cost of a cell on one core, for ``--dry-run``; measured on the anchor rows."""
 BYTES_PER_FRAME = 21 * 16 + 12
 WHOLE_TAKE_FRAMES = 1600
+TRAINED_HERE = "fit part, budget "
+"""What a row was trained on that this benchmark trained itself, followed by the budget."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: s
     traits = adapter.traits
     trained = traits.trained_on
     if adapter.fits() and adapter.kind == "method":
-        trained = f"fit part, budget {budget}"
+        trained = TRAINED_HERE + budget
     return MethodFacts(
         name=adapter.name or source.name,
         title=adapter.title or adapter.name or source.name,
@@ -99,6 +101,11 @@ def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: s
         trained_on=trained,
         draws_from=adapter.draws_from,
     )
+
+
+def budget_of(facts: MethodFacts) -> str:
+    """The budget that a row of this benchmark was trained with; ``small``, the default, where nothing was trained."""
+    return facts.trained_on.removeprefix(TRAINED_HERE) if facts.trained_on.startswith(TRAINED_HERE) else "small"
 
 
 def _unsupported(adapter: type[Adapter], setting: Setting) -> str:
