@@ -11,11 +11,14 @@ from tabulate import tabulate
 from reports.formatting import UNDEFINED, count, duration, escape_markdown, number, one_line
 from reports.records import Record
 from reports.render import anchor_table, environment, to_markdown
-from reports.rows import StoredRecord, groups, load_run
+from reports.rows import GroupKey, StoredRecord, groups, load_run
 from reports.tables import Column, Table, TableRow, build_table
-from reports.verdicts import sentences
+from reports.verdicts import sentences, verdict_of
 
 MAX_DIFF_LINES = 40
+TRACKS = ("transfer", "latent", "interpolation", "parts", "gesture", "prediction", "runtime")
+"""Order of the page."""
+OWN = "stylebench-"
 
 
 def render_leaderboard(records_folder: Path) -> str:
@@ -29,14 +32,72 @@ def render_leaderboard(records_folder: Path) -> str:
     """
     stored = load_run(records_folder)
     canonical = [item for item in stored if not _is_local(item.record)]
-    tables = [(build_table(key, items), items) for key, items in groups(canonical).items()]
+    tables = [(build_table(key, items), items) for key, items in sorted(groups(canonical).items(), key=_place)]
     template = environment().get_template("leaderboard.md")
     page = template.render(
+        first=_first_screen([table for table, _ in tables]),
         sections=[_section(table, items) for table, items in tables],
         anchors=anchor_table([table for table, _ in tables]),
         left_out=_left_out(stored),
     )
     return page.rstrip() + "\n"
+
+
+def _place(item: tuple[GroupKey, Sequence[StoredRecord]]) -> tuple[object, ...]:
+    """Our own protocols first, track by track, each from its standard condition on; then those of the papers."""
+    key = item[0]
+    track = TRACKS.index(key.track) if key.track in TRACKS else len(TRACKS)
+    return (not key.protocol.startswith(OWN), track, key.condition != "standard", *map(str, key))
+
+
+def _first_screen(tables: Sequence[Table]) -> str:
+    """One line a table with a ranked method: who leads, who really transfers, who copies, what the leader costs."""
+    lines = []
+    for table in tables:
+        verdict = verdict_of(table)
+        if table.primary is None or not verdict.leaders:
+            continue
+        copying = [*verdict.copying_methods, *verdict.copying_anchors]
+        lines.append(
+            [
+                escape_markdown(_short_title(table)),
+                "; ".join(f"{escape_markdown(row.title)} {_primary(table, row)}" for row in verdict.leaders),
+                _titles(verdict.transfers),
+                _titles([*verdict.like_a_trick, *verdict.does_nothing]),
+                _titles(copying) if copying else "",
+                _costs(verdict.leaders[0]),
+            ]
+        )
+    headers = [
+        "table", "leads (tie group)", "really better than nothing and than the best trick", "not separably better",
+        "copies (no rank)", "cost of the leader",
+    ]  # fmt: skip
+    return _pipe(headers, lines)
+
+
+def _short_title(table: Table) -> str:
+    name = table.key.track if table.key.protocol.startswith(OWN) else table.protocol_id
+    condition = "" if table.key.condition == "standard" else f"/{table.key.condition}"
+    return f"{name}{condition}, {table.key.dataset.partition('@')[0]}"
+
+
+def _titles(rows: Sequence[TableRow]) -> str:
+    return ", ".join(escape_markdown(row.title) for row in rows) or "none"
+
+
+def _primary(table: Table, row: TableRow) -> str:
+    column = table.primary
+    found = row.estimates.get(column.key) if column else None
+    if column is None or found is None or found.value is None:
+        return UNDEFINED
+    return number(found.value, column.unit) + ("" if column.unit in ("1", "distance") else f" {column.unit}")
+
+
+def _costs(row: TableRow) -> str:
+    facts = row.row.method
+    wall_s = sum(record.provenance.wall_s for record, _ in row.row.stored)
+    size = "" if facts.parameters is None else f"{count(facts.parameters)} parameters, "
+    return f"{size}{escape_markdown(facts.trained_on) or 'nothing trained'}; run {duration(wall_s)}"
 
 
 def check(path: Path, records_folder: Path) -> str:

@@ -277,7 +277,7 @@ class _Verifier:
         if wrong:
             self._say("judges", "fail", f"not the judges of this benchmark, or not as described: {', '.join(wrong)}")
         else:
-            self._say("judges", "pass", f"{len(here)} canonical judges with the recorded digests")
+            self._say("judges", "pass", f"{len(here)} judges, digests and facts as recorded")
 
     def _compare_samples(
         self, arrays: Mapping[str, NDArray[Any]], scored: Mapping[str, NDArray[Any]], exact: bool
