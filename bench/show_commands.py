@@ -25,23 +25,29 @@ StoreOption = Annotated[Path, typer.Option(help="The store of the run.")]
 def movie(
     run_folder: RunFolder,
     rows: RowsOption,
-    sample: Annotated[str, typer.Option(help="Sample id.")] = "s0000",
-    out: Annotated[Path, typer.Option(help="A .gif, or an .mp4 where ffmpeg is installed.")] = Path("movie.gif"),
+    sample: Annotated[str, typer.Option(help="Sample id; several for a sheet, comma-separated.")] = "s0000",
+    out: Annotated[
+        Path, typer.Option(help="A .gif, an .mp4 where ffmpeg is installed; .png, .pdf or .svg is a sheet of poses.")
+    ] = Path("movie.gif"),
     table: TableOption = "",
     store: StoreOption = STORE,
 ) -> None:
-    """Write source, style reference and some rows side by side as a GIF or MP4.
+    """Write source, style reference and some rows side by side as a GIF or MP4, or pose by pose as a picture.
 
     Example: stylebench movie runs/latest --rows copy-content,style-mean-shift --sample s0003
     """
-    from reports.movie import write_movie
+    from reports.movie import SHEET_FORMS, write_movie, write_sheet
 
-    names = names_of(rows)
-    player = _player(run_folder, store, table, names, (sample,))
-    if not player.samples:
+    names, samples = names_of(rows), names_of(sample)
+    player = _player(run_folder, store, table, names, samples)
+    if len(player.samples) < len(samples):
         raise BadConfig(f"no sample {sample!r}", where="--sample", remedy="sample ids look like s0003")
     bodies = ["content", "style", *(["truth"] if "truth" in player.bodies else []), *names]
-    console.say(f"wrote {write_movie(player, 0, bodies, out)}")
+    if out.suffix.lower() in SHEET_FORMS:
+        write_sheet(player, range(len(samples)), bodies, out)
+    else:
+        write_movie(player, 0, bodies, out)
+    console.say(f"wrote {out}")
 
 
 def study(

@@ -85,7 +85,7 @@ class Section:
 
 def table_section(tables: Sequence[Table]) -> Section:
     """All tables of a run, main columns and details."""
-    shown = [text for table in tables for text in (to_html(table), to_html(table, "details"))]
+    shown = [to_html(table) + (to_html(table, "details") if table.columns_of("details") else "") for table in tables]
     return Section("tables", "Tables", ("Click a column's title to sort by it.",), tuple(shown))
 
 

@@ -315,7 +315,8 @@ def to_html(table: Table, part: Part = "main") -> str:
         for section, frame in found
     ]
     template = environment().get_template("table.html")
-    return template.render(title=table.title, headers=headers, groups=groups, notes=notes)
+    title = table.title if part == "main" else f"{table.title}: more columns"
+    return template.render(title=title, headers=headers, groups=groups, notes=notes)
 
 
 def environment() -> jinja2.Environment:

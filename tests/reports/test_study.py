@@ -6,10 +6,11 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
-from reports.movie import write_movie
+from reports.movie import write_movie, write_sheet
 from reports.page import PlayerTable
 from reports.records import BadRecord
 from reports.study import COLUMNS, KEY_FILE, PAGE_FILE, score_study, write_study
@@ -85,3 +86,16 @@ def test_a_movie_has_a_picture_a_frame(tmp_path: Path) -> None:
         write_movie(player(), 0, ["nobody"], tmp_path / "m.gif")
     with pytest.raises(BadRecord, match=r"saved as \.gif or \.mp4"):
         write_movie(player(), 0, ["body0"], tmp_path / "m.avi")
+
+
+def test_a_contact_sheet_has_a_row_a_body_and_a_block_a_sample(tmp_path: Path) -> None:
+    heights = []
+    for samples in ([0], [0, 1]):
+        with Image.open(write_sheet(player(n_samples=2), samples, ["body0", "body1"], tmp_path / "s.png")) as image:
+            assert len(np.unique(np.asarray(image.convert("L")))) > 10
+            heights.append(image.height)
+    assert heights[1] == pytest.approx(2 * heights[0], abs=2)
+    with pytest.raises(BadRecord, match="contact sheet"):
+        write_sheet(player(), [0], ["body0"], tmp_path / "s.gif")
+    with pytest.raises(BadRecord, match="nobody"):
+        write_sheet(player(), [0], ["nobody"], tmp_path / "s.png")
