@@ -117,7 +117,9 @@ def learn_new_style(takes: Sequence[Take], new: str, budget: str, out: Path) -> 
     before, styles = _codes(network, {style: found.clips for style, found in held_out.items()})
     fresh, _ = examples_of([take for take in fit if take.style == new], "lpn")
     fine_tune(network, fresh, FINE_TUNING_STEPS, request)
-    after, _ = _codes(network, {style: found.clips for style, found in held_out.items()})
+    # Styles that were known keep the parameters that were saved before (section 4.4): they answer as they did.
+    after = before.copy()
+    after[np.array(styles) == new] = _codes(network, {new: held_out[new].clips})[0]
     shares = _own_share(before, styles, new), _own_share(after, styles, new)
     print(f"clips of {new} nearest to a clip of {new}: {shares[0]:.2f} before, {shares[1]:.2f} after")
     print(f"distance of {new} from the nearest other style over the spread of styles: "

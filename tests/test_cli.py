@@ -10,12 +10,14 @@ from typer.testing import CliRunner
 
 from bench import __version__
 from bench.cli import app
+from tests.reports.factory import FakeMethod, write_run
 
 runner = CliRunner()
 COMMANDS = (
     ["run"], ["new-adapter"], ["check"], ["export-tasks"], ["score"], ["list"], ["data", "info"],
     ["data", "verify"], ["data", "fetch"], ["data", "skeleton"], ["report"],
-    ["leaderboard"], ["ladder"], ["clean"],
+    ["leaderboard"], ["ladder"], ["clean"], ["fit"], ["movie"], ["study"], ["study-score"], ["nightly"], ["trust"],
+    ["table"], ["pack"], ["verify"], ["reproduce"], ["diff"],
 )  # fmt: skip
 
 
@@ -115,3 +117,23 @@ def test_from_exported_tasks_to_a_row_without_code(tmp_path: Path) -> None:
     assert "my method" in scored.stdout
     [record] = [json.loads(path.read_text()) for path in (tmp_path / "run" / "records").glob("*.json")]
     assert record["copies"] and record["method"]["trained_on"] == "not said"
+
+
+def test_a_paper_table_is_explained_and_runs_are_compared(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "records", [FakeMethod("park2021", "Park 2021"), FakeMethod("mine", "Mine")])
+    shown = runner.invoke(app, ["table", "park2021.table2", "--records", str(folder), "--format", "md"])
+    assert shown.exit_code == 0 and "42.81 ± 2.53" in shown.output
+    told = runner.invoke(app, ["table", "park2021.table2", "--records", str(folder), "--explain", "park2021:CRA"])
+    assert "published: 60.86 ± 2.06 %" in told.output and "ours: none; no record" in told.output
+    same = runner.invoke(app, ["diff", str(folder), str(folder)])
+    assert same.exit_code == 0 and "separable at 0.05" in same.output
+
+
+def test_verify_fails_with_exit_code_1_and_names_the_record(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "records", [FakeMethod("mine", "Mine")])
+    [path] = folder.glob("*.json")
+    path.write_text(path.read_text().replace('"status": "ok"', '"status": "fine"'))
+    out = ["--out", str(tmp_path / "out"), "--store", str(tmp_path / "store")]
+    result = runner.invoke(app, ["verify", str(folder), "--json", *out])
+    [claim] = json.loads(result.stdout)
+    assert result.exit_code == 1 and claim["verdict"] == "fail" and path.name in claim["record"]
