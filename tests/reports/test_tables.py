@@ -173,6 +173,17 @@ def test_leaderboard_is_the_same_bytes_and_notices_a_changed_digit(folder: Path,
     assert "missing" in check(tmp_path / "none.md", folder)
 
 
+def test_the_first_screen_says_who_transfers_who_copies_and_what_it_costs(folder: Path) -> None:
+    page = render_leaderboard(folder)
+    head = page[: page.index("## At a glance")]
+    [line] = [line for line in head.splitlines() if line.startswith("| transfer, bandai-namco")]
+    cells = [cell.strip() for cell in line.strip("|").split("|")]
+    assert "Park 2021" in cells[1] and "%" in cells[1]
+    assert "Cheater" in cells[4] and "copy content" in cells[4]
+    assert "parameters" in cells[5] and "budget small" in cells[5] and "run" in cells[5]
+    assert page.index("## Who transfers style") < page.index("## How to read the tables") < page.index("## How to submit")
+
+
 def test_local_judges_never_enter_the_leaderboard(tmp_path: Path) -> None:
     tasks = FakeTasks(n=40, n_clusters=10)
     for fake in (*ANCHORS[:3], METHODS[0]):
