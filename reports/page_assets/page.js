@@ -38,21 +38,33 @@
     keyed.forEach((item) => body.append(item.row));
   }
 
-  function drawPlots() {
-    if (typeof Plotly === "undefined") return;
+  function draw(place) {
     const style = getComputedStyle(document.documentElement);
     const ink = style.getPropertyValue("--ink").trim();
     const faint = style.getPropertyValue("--faint").trim();
     const axis = { gridcolor: faint, zerolinecolor: faint, linecolor: faint, automargin: true };
-    for (const place of document.querySelectorAll(".plot")) {
-      const figure = JSON.parse(document.getElementById(place.dataset.figure).textContent);
-      const layout = { ...figure.layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 } };
-      for (const name of ["xaxis", "yaxis"]) layout[name] = { ...axis, ...layout[name] };
-      Plotly.newPlot(place, figure.data, layout, { responsive: true, displaylogo: false });
-    }
+    const figure = JSON.parse(document.getElementById(place.dataset.figure).textContent);
+    const layout = { ...figure.layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 } };
+    for (const name of ["xaxis", "yaxis"]) layout[name] = { ...axis, ...layout[name] };
+    Plotly.newPlot(place, figure.data, layout, { responsive: true, displaylogo: false });
+  }
+
+  // Plots are drawn when they come near the window: the motions do not wait for them.
+  function drawWhenNear() {
+    if (typeof Plotly === "undefined") return;
+    const drawn = new Set();
+    const near = new IntersectionObserver((found) => {
+      for (const { target, isIntersecting } of found) {
+        if (!isIntersecting) continue;
+        near.unobserve(target);
+        drawn.add(target);
+        draw(target);
+      }
+    }, { rootMargin: "500px" });
+    document.querySelectorAll(".plot").forEach((place) => near.observe(place));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach(draw));
   }
 
   document.querySelectorAll("table.stylebench").forEach(sortable);
-  drawPlots();
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawPlots);
+  addEventListener("load", drawWhenNear);
 })();

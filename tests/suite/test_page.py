@@ -115,4 +115,6 @@ def test_tables_sort(page: Any) -> None:
 
 
 def test_plots_are_drawn(page: Any) -> None:
-    assert page.locator("#pareto .plot .main-svg").count() > 0
+    place = page.locator("#pareto .plot").first
+    place.scroll_into_view_if_needed()
+    place.locator(".main-svg").first.wait_for()
