@@ -174,6 +174,11 @@ class Record(_Strict):
     def protocol_id(self) -> str:
         return f"{self.protocol}@{self.protocol_version}"
 
+    @property
+    def protocol_label(self) -> str:
+        """``stylebench-transfer@1/self``; the standard condition has no name."""
+        return self.protocol_id + ("" if self.condition == "standard" else f"/{self.condition}")
+
     def find(self, name: str, slice_name: str = "all") -> Measurement | None:
         """The measurement of that name and slice, or None."""
         for measurement in self.measurements:

@@ -29,8 +29,7 @@ def test_both_datasets_are_there() -> None:
 @pytest.mark.parametrize("stored", STORED, ids=lambda stored: f"{stored.record.dataset}-{stored.record.method.name}")
 def test_published_record_belongs_to_this_version(stored: StoredRecord) -> None:
     record, path = stored
-    condition = "" if record.condition == "standard" else f"/{record.condition}"
-    protocol = PROTOCOLS[record.protocol_id + condition]
+    protocol = PROTOCOLS[record.protocol_label]
     assert {m.name for m in record.measurements} <= {*protocol.metrics, *protocol.truth_metrics}
     assert all(m.version == METRICS[m.name].version for m in record.measurements)
     assert not record.provenance.dirty and record.provenance.commit

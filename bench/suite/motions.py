@@ -17,9 +17,21 @@ from bench.motion.clip import Clip
 from bench.motion.kinematics import forward_kinematics
 from bench.motion.representation import JUDGE_SLICES, window_frame
 from bench.motion.skeleton import Skeleton, canonical_skeleton
+from bench.suite.store import Store
 from reports.records import digest_of_arrays
 
 MOTIONS_FILE = "motions.npz"
+
+
+def put_given(store: Store, key: str, motions: Motions) -> None:
+    """Store motions that were not generated here, as if they had been."""
+
+    def write(draft: Path) -> dict[str, object]:
+        motions.save(draft)
+        return {"motions_digest": motions.digest, "n": motions.n, "wall_s": 0.0, "peak_rss_mb": 0.0}
+
+    if not store.has("motions", key):
+        store.put("motions", key, write)
 
 
 @dataclass(frozen=True, eq=False)

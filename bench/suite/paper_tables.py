@@ -46,7 +46,7 @@ def paper_tables(table_id: str, stored: Sequence[StoredRecord]) -> tuple[PaperTa
         )
     published = () if table_id in WITHOUT_PRINTED_NUMBERS else published_numbers(table_id)
     label = protocol_of(table_id)
-    own = [item for item in stored if _label(item) == label]
+    own = [item for item in stored if item.record.protocol_label == label]
     found = groups(own)
     if not found:
         return (_joined(table_id, published, None, ()),)
@@ -58,11 +58,6 @@ def protocol_of(table_id: str) -> str:
     paper, _, table = table_id.partition(".")
     label = f"{paper}@1/{table}"
     return label if label in PROTOCOLS else ""
-
-
-def _label(item: StoredRecord) -> str:
-    record = item.record
-    return record.protocol_id + ("" if record.condition == "standard" else f"/{record.condition}")
 
 
 def _joined(
@@ -260,10 +255,13 @@ def explain(table: PaperTable, cell: str, stored: Sequence[StoredRecord]) -> str
     found = row.cells[column.name]
     lines = [f"{table.title}, row {row.label}, {column.title}, {table.dataset or 'no records'}", ""]
     lines += _published_lines(table.table_id, row, column, found)
+    label = protocol_of(table.table_id)
     own = [
-        item for item in stored if item.record.method.name == row.method and _label(item) == protocol_of(table.table_id)
+        item
+        for item in stored
+        if (item.record.method.name, item.record.protocol_label) == (row.method, label)
+        and f"{item.record.dataset} · {item.record.profile}" == table.dataset
     ]
-    own = [item for item in own if f"{item.record.dataset} · {item.record.profile}" == table.dataset]
     if found.ours is None or not own:
         return "\n".join([*lines, f"ours: none; {found.gap}"]) + "\n"
     return "\n".join([*lines, *_our_lines(found.ours, column, own)]) + "\n"

@@ -48,14 +48,13 @@ def reproduce(
     name = record.dataset.partition("@")[0]
     if name not in data:
         raise BadConfig(f"the record is of {record.dataset}", where="--data", remedy=f"give --data {name}=PATH")
-    label = record.protocol_id + ("" if record.condition == "standard" else f"/{record.condition}")
     request = RunRequest(
         data=dict(data),
         out=out,
         store=store,
         methods=(record.method.name,),
         tracks=(),
-        protocols=(label,),
+        protocols=(record.protocol_label,),
         profile=record.profile,
         seeds=(record.seed,),
         budget=budget_of(record.method),

@@ -13,7 +13,7 @@ from bench.datasets.reading import Overrides
 from bench.datasets.table import load_dataset
 from bench.errors import BadConfig, BadFile
 from bench.suite.keys import generate_key
-from bench.suite.motions import Motions
+from bench.suite.motions import put_given
 from bench.suite.plan import Cell
 from bench.suite.request import RunRequest, check_profile, check_request, protocol_called
 from bench.suite.run import fresh_records_folder
@@ -99,8 +99,7 @@ def score_submission(folder: Path, setting: Setting, request: RunRequest, progre
     store = Store(request.store)
     found = read_submission(folder, setting, progress=lambda what, done, total: progress("data", what, done, total))
     cell = _cell(found, setting)
-    if not store.has("motions", cell.motions_key):
-        store.put("motions", cell.motions_key, lambda draft: _write(found.motions, draft))
+    put_given(store, cell.motions_key, found.motions)
     with session_of(request, progress) as session:
         [record] = SettingRun(session, setting).run([cell], fresh_records_folder(request.out)).records
     return record
@@ -128,8 +127,3 @@ def _cell(found: Submission, setting: Setting) -> Cell:
         motions_key=generate_key(digest, setting.tasks_digest, 0),
         given=True,
     )
-
-
-def _write(motions: Motions, draft: Path) -> dict[str, object]:
-    motions.save(draft)
-    return {"motions_digest": motions.digest, "n": motions.n, "wall_s": 0.0, "peak_rss_mb": 0.0}

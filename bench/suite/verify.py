@@ -9,7 +9,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,7 +28,7 @@ from bench.suite.answering import answering
 from bench.suite.assemble import protocol_facts
 from bench.suite.cell import world_of
 from bench.suite.keys import adapter_digest
-from bench.suite.motions import Motions
+from bench.suite.motions import Motions, put_given
 from bench.suite.packs import PACKS_FOLDER, MotionPack, fetch, pack_name, read_pack
 from bench.suite.plan import Cell, budget_of, plan_cells
 from bench.suite.request import RunRequest
@@ -189,7 +188,7 @@ class _Verifier:
 
     def _setting(self, record: Record) -> Setting | None:
         """The record's setting made again here; None where that is not possible or gives another one."""
-        label = record.protocol_id + ("" if record.condition == "standard" else f"/{record.condition}")
+        label = record.protocol_label
         if label not in PROTOCOLS:
             self._say("protocol", "cannot check", f"no protocol {label} here")
             return None
@@ -258,8 +257,7 @@ class _Verifier:
         cell = _cell(record)
         request = RunRequest(data={}, out=self.request.out, store=self.request.store, tracks=(), jobs=1)
         store = Store(self.request.store)
-        if not store.has("motions", cell.motions_key):
-            store.put("motions", cell.motions_key, partial(_write, pack.motions))
+        put_given(store, cell.motions_key, pack.motions)
         with session_of(request, self.progress) as session:
             folder = fresh_records_folder(request.out)
             [again] = SettingRun(session, setting).run([cell], folder).records
@@ -377,11 +375,6 @@ def _cell(record: Record) -> Cell:
         motions_key=digest_of({"pack": record.motions_digest}),
         given=known is None or not issubclass(known, Oracle),
     )
-
-
-def _write(motions: Motions, draft: Path) -> dict[str, object]:
-    motions.save(draft)
-    return {"motions_digest": motions.digest, "n": motions.n, "wall_s": 0.0, "peak_rss_mb": 0.0}
 
 
 def _same_array(one: NDArray[Any] | None, other: NDArray[Any] | None) -> bool:

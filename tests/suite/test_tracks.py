@@ -30,8 +30,7 @@ class Rows:
         self.found: dict[str, dict[str, Record]] = defaultdict(dict)
         self.folder = folder
         for record in records:
-            condition = "" if record.condition == "standard" else f"/{record.condition}"
-            self.found[record.protocol_id + condition][record.method.name] = record
+            self.found[record.protocol_label][record.method.name] = record
 
     def value(self, label: str, method: str, metric: str, slice_name: str = "all") -> float:
         found = self.found[label][method].find(metric, slice_name)
