@@ -88,7 +88,7 @@ def style_space_figure(
                 panel.annotate(
                     style, np.median(places[rows], axis=0), ha="center", fontsize=8, weight="bold" if new else "normal"
                 )
-            panel.set_title(f"{title}: {100 * share:.0f} % of new clips nearest to their own style")
+            panel.set_title(f"{title}:\n{100 * share:.0f} % of new clips nearest to their own style", fontsize=10)
             panel.set_xticks([])
             panel.set_yticks([])
     return figure
