@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from reports.figures import styled
+from reports.figures import plain_log, styled
 from reports.records import BadRecord
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -65,6 +65,7 @@ def loss_figure(title: str, trainings: Sequence[TrainingCurves]) -> Figure:
             seen = np.concatenate(drawn)
             if len(seen) and seen.min() > 0.0 and seen.max() > 10.0 * seen.min():
                 panel.set_yscale("log")
+                plain_log(panel.yaxis)
             panel.set_title(name, fontsize=9.0)
             panel.tick_params(labelsize=7.0)
         for panel in panels[len(names) :]:

@@ -12,10 +12,12 @@ from typing import Any, Literal
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from reports.aggregate import Estimate
@@ -51,6 +53,13 @@ CAPTION_COLUMNS = 120
 def styled() -> AbstractContextManager[None]:
     """The look of all figures, whatever the reader's own settings are."""
     return mpl.rc_context({**mpl.rcParamsDefault, **STYLE, "backend": mpl.rcParams["backend"]})
+
+
+def plain_log(axis: Axis) -> None:
+    """Labels of a logarithmic axis as plain numbers: powers in mathematical notation would be shown as their source."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def recognition_scatter(table: Table) -> Figure:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from reports.figures import styled
+from reports.figures import plain_log, styled
 from reports.plots import PERCENTILES, measured
 from reports.records import BadRecord
 from reports.tables import Table
@@ -43,6 +43,7 @@ def latency_figure(table: Table) -> Figure:
             axes.axvline(1000.0 / fps, color="#999999", linestyle=":", linewidth=1.0)
             axes.annotate(f"{fps} fps", (1000.0 / fps, -0.7), fontsize=7, ha="center")
         axes.set_xscale("log")
+        plain_log(axes.xaxis)
         axes.set_yticks(range(len(timed)), [title for title, _ in timed])
         axes.set_ylim(len(timed) - 0.4, -1.0)
         axes.set(xlabel="one frame online, ms: median (o), p90 (|), p99 (diamond), slowest (x)", title=table.title)

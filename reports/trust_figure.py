@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
-from reports.figures import styled
+from reports.figures import plain_log, styled
 from reports.records import BadRecord
 from reports.trust import Curve, TrustData
 
@@ -71,9 +71,7 @@ def _dress(axes: Axes, data: TrustData, curves: Sequence[Curve]) -> None:
     axes.set_xlim(sizes[0] * 0.93, sizes[-1] * 1.07)
     axes.axvspan(sizes[0] * 0.93, 2 * FEATURES, color="#EEEEEE", zorder=0)
     axes.text(sizes[0], 1.0, " n < 2 d", transform=axes.get_xaxis_transform(), fontsize=7.5, va="top", color="#777777")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(ScalarFormatter())
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_minor_formatter(NullFormatter())
+    plain_log(axes.yaxis)
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(axis="y", color="#E5E5E5", linewidth=0.7)
     axes.set_axisbelow(True)

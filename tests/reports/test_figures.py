@@ -10,6 +10,7 @@ from matplotlib.image import imread
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 
+from reports.curves import TrainingCurves, loss_figure
 from reports.figures import interval_bars, recognition_scatter, save_figure
 from reports.records import BadRecord
 from reports.tables import Table, tables_of_run
@@ -107,3 +108,11 @@ def test_other_suffixes_and_empty_tables_are_refused(table: Table, bars: Figure,
         interval_bars(unfinished)
     with pytest.raises(BadRecord, match="no column cra"):
         recognition_scatter(unfinished)
+
+
+def test_logarithmic_axes_are_labelled_with_plain_numbers() -> None:
+    values = np.geomspace(0.001, 100.0, 20)[:, None]
+    figure = loss_figure("losses", [TrainingCurves("seed 0", ("loss",), np.arange(20), values)])
+    figure.canvas.draw()
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert "0.01" in labels and "10" in labels and not any("$" in label for label in labels)
