@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import shutil
 import sys
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench import __version__, console
-from bench.command_options import RUNS, STORE, data_of, datasets_of, names_of, seeds_of
+from bench.command_options import RUNS, STORE, command_line, data_of, datasets_of, names_of, seeds_of
 from bench.data_commands import FpsOption, UnitOption, UpOption, data_app, overrides_of
 from bench.errors import BadConfig, BenchError
 from bench.nightly_command import nightly
@@ -117,7 +116,7 @@ def run(
         device=device,
         split=split,
         retrain_judges=retrain_judges,
-        command=shlex.join(["stylebench", *sys.argv[1:]]),
+        command=command_line(sys.argv[1:]),
     )
     if dry_run:
         _print_plan(request, as_json)
@@ -162,7 +161,7 @@ def fit(
     order = FitOrder(
         data=datasets_of(data or ["procedural"]), methods=names_of(methods), adapter_files=tuple(adapter or ()),
         budget=budget, seeds=seeds_of(seeds), device=device, split=split, jobs=jobs, out=out, store=store,
-        command=shlex.join(["stylebench", *sys.argv[1:]]),
+        command=command_line(sys.argv[1:]),
     )  # fmt: skip
     with console.ProgressDisplay() as progress:
         found = fit_all(order, progress)
@@ -285,7 +284,7 @@ def score(
         store=store,
         tracks=(),
         jobs=1,
-        command=shlex.join(["stylebench", *sys.argv[1:]]),
+        command=command_line(sys.argv[1:]),
     )
     with console.ProgressDisplay() as progress:
         setting = submit.exported_setting(folder, data_of(data, overrides_of(unit, up, fps)), store, progress)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +16,12 @@ if TYPE_CHECKING:
 
 RUNS = Path("runs")
 STORE = RUNS / "store"
+_FOLDERS = re.compile(r"(^|=)/(?:[^/=,]+/)*")
+
+
+def command_line(arguments: Sequence[str]) -> str:
+    """The command as typed, for records; absolute paths lose their folders, which belong to one machine."""
+    return shlex.join(["stylebench", *(_FOLDERS.sub(r"\1", argument) for argument in arguments)])
 
 
 def names_of(option: str) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Annotated
 import typer
 
 from bench import console
+from bench.command_options import command_line
 
 
 def nightly(
@@ -25,7 +25,7 @@ def nightly(
 
     name = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     with console.ProgressDisplay() as progress:
-        result = night(read_config(config), name, shlex.join(["stylebench", *sys.argv[1:]]), progress)
+        result = night(read_config(config), name, command_line(sys.argv[1:]), progress)
     text = (result.folder / SUMMARY).read_text(encoding="utf-8")
     if as_json:
         found = result.comparison

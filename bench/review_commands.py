@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench import console
-from bench.command_options import RUNS, STORE, datasets_of, names_of
+from bench.command_options import RUNS, STORE, command_line, datasets_of, names_of
 from bench.errors import BadConfig
 from reports.formatting import number, with_interval
 
@@ -131,7 +130,7 @@ def reproduce(
     with console.ProgressDisplay() as progress:
         old, _, found = again(
             record, datasets_of(data or ["procedural"]), out or asked.default_out(RUNS), store, progress,
-            shlex.join(["stylebench", *sys.argv[1:]]),
+            command_line(sys.argv[1:]),
         )  # fmt: skip
     shown = [item for item in found if everything or item.outcome != "same"]
     if as_json:

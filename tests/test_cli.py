@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from bench import __version__
 from bench.cli import app
+from bench.command_options import command_line
 from tests.reports.factory import FakeMethod, write_run
 
 runner = CliRunner()
@@ -137,3 +138,20 @@ def test_verify_fails_with_exit_code_1_and_names_the_record(tmp_path: Path) -> N
     result = runner.invoke(app, ["verify", str(folder), "--json", *out])
     [claim] = json.loads(result.stdout)
     assert result.exit_code == 1 and claim["verdict"] == "fail" and path.name in claim["record"]
+
+
+def test_commands_in_records_name_no_folder_of_this_machine() -> None:
+    typed = [
+        "run",
+        "--data",
+        "bandai-namco=/home/me/data/bandai.zip",
+        "--tracks",
+        "transfer,parts",
+        "--out",
+        "/tmp/x/out",
+    ]
+    said = command_line([*typed, "--protocols", "park2021@1/table2", "--store=/a/b/store", "mine/records"])
+    assert said == (
+        "stylebench run --data bandai-namco=bandai.zip --tracks transfer,parts --out out "
+        "--protocols park2021@1/table2 --store=store mine/records"
+    )
