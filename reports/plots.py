@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -89,8 +90,13 @@ def latencies(table: Table) -> go.Figure | None:
             hovertemplate="%{y} %{text}: %{x:.3g} ms<extra></extra>",
         )  # fmt: skip
     for fps in (30, 60, 120):
-        figure.add_vline(x=1000.0 / fps, line={"dash": "dot", "width": 1}, annotation_text=f"{fps} fps")
-    figure.update_xaxes(title="one frame online, ms: median, p90, p99, slowest", type="log")
+        deadline_ms = 1000.0 / fps
+        figure.add_vline(x=deadline_ms, line={"dash": "dot", "width": 1, "color": "#888888"})
+        # Words on a logarithmic axis are placed by the exponent, lines by the value.
+        figure.add_annotation(
+            x=math.log10(deadline_ms), y=1.0, yref="paper", yanchor="bottom", text=f"{fps}", showarrow=False
+        )
+    figure.update_xaxes(title="one frame online, ms: median, p90, p99, slowest", type="log", dtick=1)
     figure.update_layout(height=140 + 28 * len(found))
     return figure
 

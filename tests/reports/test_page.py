@@ -13,8 +13,9 @@ import pytest
 from reports.curves import TrainingCurves
 from reports.page import FARTHEST_MM, Body, PlayerTable, Section, table_section, write_page
 from reports.plots import confusion, latencies, pareto, plain, plot_of, training
+from reports.records import Measurement
 from reports.tables import Table, tables_of_run
-from tests.reports.factory import ANCHORS, METHODS, FakeMethod, FakeTasks, write_run
+from tests.reports.factory import ANCHORS, METHODS, FakeMethod, FakeTasks, make_row, write_row, write_run
 
 MARKUP = "</script><script>window.hacked = 1</script>"
 
@@ -95,6 +96,22 @@ def test_what_is_too_far_away_is_held_at_the_edge(tmp_path: Path) -> None:
 def test_twelve_methods_and_thirty_samples_are_small(tmp_path: Path) -> None:
     write_page(tmp_path, "t", "s", [Section("motions", "M")], [player(n_samples=30, n_bodies=15)])
     assert sum(path.stat().st_size for path in tmp_path.rglob("*") if path.is_file()) < 15_000_000
+
+
+def test_deadlines_stand_where_their_lines_are(tmp_path: Path) -> None:
+    record, _ = make_row(FakeMethod("quick", "Quick"), FakeTasks())
+    times = [
+        Measurement(name=f"latency_{name}", version=1, slice="online", value=value, unit="ms", better="lower", n=200)
+        for name, value in (("p50", 1.0), ("p90", 2.0), ("p99", 3.0), ("max", 4.0))
+    ]
+    facts = {"track": "runtime", "protocol": "stylebench-runtime", "measurements": tuple(times), "samples_digest": ""}
+    write_row(tmp_path, record.model_copy(update=facts), {})
+    [timed] = tables_of_run(tmp_path)
+    figure = latencies(timed)
+    assert figure is not None
+    places = {item.text: item.x for item in figure.layout.annotations}
+    assert places == pytest.approx({"30": 1.5229, "60": 1.2218, "120": 0.9208}, abs=1e-4)
+    assert sorted(line.x0 for line in figure.layout.shapes) == pytest.approx([1000 / 120, 1000 / 60, 1000 / 30])
 
 
 def test_plots_show_what_they_are_given(table: Table) -> None:
