@@ -108,7 +108,7 @@ def test_from_exported_tasks_to_a_row_without_code(tmp_path: Path) -> None:
     assert stylebench("export-tasks", "out", "--profile", "smoke", "--motions", "npz", cwd=tmp_path).returncode == 0
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
     incomplete = stylebench("score", "out", cwd=tmp_path)
-    assert incomplete.returncode == 2 and "60 of 60 answers are missing" in incomplete.stderr
+    assert incomplete.returncode == 2 and "100 of 100 answers are missing" in incomplete.stderr
     for task in manifest["tasks"]:
         content = tmp_path / "out" / task["content"]
         (tmp_path / "out" / task["answer"]).write_bytes(content.read_bytes())

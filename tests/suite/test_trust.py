@@ -13,7 +13,7 @@ from bench.suite.trust import measure
 from bench.suite.trust_curves import curve
 from bench.suite.trust_rows import judged_measurements, session_facts, sessions_of
 from reports.rows import load_run
-from tests.suite.tiny import tiny_dataset
+from tests.suite.tiny import tiny_dataset, tiny_tables
 
 
 def test_sessions_worked_by_hand() -> None:
@@ -58,5 +58,5 @@ def test_runs_that_cannot_be_measured_are_refused(undisturbed: Path, tmp_path: P
         measure([tmp_path], {"procedural": None}, tmp_path / "store", lambda *_: None)
     with pytest.raises(BadConfig, match="there are records of tiny, but not the dataset"):
         measure([undisturbed / "out"], {"procedural": None}, tmp_path / "store", lambda *_: None)
-    with pytest.raises(JudgeRefused, match="there is no second judge family"):
+    with tiny_tables(), pytest.raises(JudgeRefused, match="there is no second judge family"):
         measure([undisturbed / "out"], {"tiny": None}, undisturbed / "store", lambda *_: None)
