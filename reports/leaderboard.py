@@ -13,7 +13,7 @@ from reports.records import Record
 from reports.render import anchor_table, environment, to_markdown
 from reports.rows import GroupKey, StoredRecord, groups, load_run
 from reports.tables import Column, Table, TableRow, build_table
-from reports.verdicts import sentences, verdict_of
+from reports.verdicts import Verdict, sentences, verdict_of
 
 MAX_DIFF_LINES = 40
 TRACKS = ("transfer", "latent", "interpolation", "parts", "gesture", "prediction", "runtime")
@@ -32,12 +32,13 @@ def render_leaderboard(records_folder: Path) -> str:
     """
     stored = load_run(records_folder)
     canonical = [item for item in stored if not _is_local(item.record)]
-    tables = [(build_table(key, items), items) for key, items in sorted(groups(canonical).items(), key=_place)]
+    built = [(build_table(key, items), items) for key, items in sorted(groups(canonical).items(), key=_place)]
+    tables = [(table, items, verdict_of(table)) for table, items in built]
     template = environment().get_template("leaderboard.md")
     page = template.render(
-        first=_first_screen([table for table, _ in tables]),
-        sections=[_section(table, items) for table, items in tables],
-        anchors=anchor_table([table for table, _ in tables]),
+        first=_first_screen([(table, verdict) for table, _, verdict in tables]),
+        sections=[_section(table, items, verdict) for table, items, verdict in tables],
+        anchors=anchor_table([table for table, _, _ in tables]),
         left_out=_left_out(stored),
     )
     return page.rstrip() + "\n"
@@ -50,11 +51,10 @@ def _place(item: tuple[GroupKey, Sequence[StoredRecord]]) -> tuple[object, ...]:
     return (not key.protocol.startswith(OWN), track, key.condition != "standard", *map(str, key))
 
 
-def _first_screen(tables: Sequence[Table]) -> str:
+def _first_screen(tables: Sequence[tuple[Table, Verdict]]) -> str:
     """One line a table with a ranked method: who leads, who really transfers, who copies, what the leader costs."""
     lines = []
-    for table in tables:
-        verdict = verdict_of(table)
+    for table, verdict in tables:
         if table.primary is None or not verdict.leaders:
             continue
         copying = [*verdict.copying_methods, *verdict.copying_anchors]
@@ -125,10 +125,10 @@ def _left_out(stored: Sequence[StoredRecord]) -> list[str]:
     return [f"{escape_markdown(title)} on {escape_markdown(dataset)}" for title, dataset in sorted(names)]
 
 
-def _section(table: Table, stored: Sequence[StoredRecord]) -> dict[str, object]:
+def _section(table: Table, stored: Sequence[StoredRecord], verdict: Verdict) -> dict[str, object]:
     return {
         "title": escape_markdown(table.title),
-        "overview": sentences(table),
+        "overview": sentences(table, verdict),
         "cost": _cost(table),
         "facts": _facts(table),
         "main": to_markdown(table, "main").rstrip(),

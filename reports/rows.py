@@ -98,12 +98,21 @@ def load_run(folder: Path) -> tuple[StoredRecord, ...]:
     ------
     BadRecord : no such folder, or a JSON file in it is not a record.
     """
+    stored = [StoredRecord(read_record(path), path) for path in record_paths(folder)]
+    return tuple(sorted(stored, key=lambda item: (_order(item.record), item.path.name)))
+
+
+def record_paths(folder: Path) -> list[Path]:
+    """The files of :func:`load_run`, unread and sorted by path.
+
+    Raises
+    ------
+    BadRecord : no such folder.
+    """
     place = folder / "records" if (folder / "records").is_dir() else folder
     if not place.is_dir():
         raise BadRecord(f"{folder}: no such folder; expected a run folder or a folder of records")
-    paths = sorted(path for path in place.rglob("*.json") if not path.name.startswith("."))
-    stored = [StoredRecord(read_record(path), path) for path in paths]
-    return tuple(sorted(stored, key=lambda item: (_order(item.record), item.path.name)))
+    return sorted(path for path in place.rglob("*.json") if not path.name.startswith("."))
 
 
 def _order(record: Record) -> tuple[str, ...]:

@@ -84,12 +84,11 @@ def _better_than_all(
     return tuple(row for row in rows if all((row.row.method.name, r.row.method.name) in beaten for r in rivals))
 
 
-def sentences(table: Table) -> list[str]:
-    """The verdict as Markdown sentences, one fact each."""
+def sentences(table: Table, verdict: Verdict) -> list[str]:
+    """The verdict on a table as Markdown sentences, one fact each."""
     column = table.primary
     if column is None:
         return ["No row of this table has finished."]
-    verdict = verdict_of(table)
     said = [_leading(table, column, verdict)]
     if verdict.transfers:
         done = "Really transfer style" if column.metric == "joint_recognition" else "Really better"
@@ -101,7 +100,7 @@ def sentences(table: Table) -> list[str]:
         said.append(f"**Not separable from doing nothing:** {_names(verdict.does_nothing)}.")
     if verdict.copying_methods:
         said.append(f"**Only copy** (no rank, whatever they score): {_names(verdict.copying_methods)}.")
-    said += [_scale(table, column), _if_frechet_ranked(table)]
+    said += [_scale(table, column, verdict.trick), _if_frechet_ranked(table)]
     return [sentence for sentence in said if sentence]
 
 
@@ -118,7 +117,7 @@ def _leading(table: Table, column: Column, verdict: Verdict) -> str:
     return f"**Leads** on {column.title}{tie}: {values}."
 
 
-def _scale(table: Table, column: Column) -> str:
+def _scale(table: Table, column: Column, trick: TableRow | None) -> str:
     """Where real motion, the best trick and the best do-nothing row stand on the primary column."""
     anchors = table.of("anchors")
     families = (("real data", CEILING_ROWS[:2]), ("the best do-nothing row", NOTHING_ROWS))
@@ -127,7 +126,6 @@ def _scale(table: Table, column: Column) -> str:
         found = [row for row in anchors if is_one_of(row.row.method.name, names)]
         if found:
             parts.append(f"{words} ({escape_markdown(found[0].title)}) {_value(column, found[0])}")
-    trick = verdict_of(table).trick
     if trick is not None:
         parts.insert(1, f"the best simple trick ({escape_markdown(trick.title)}) {_value(column, trick)}")
     return f"**Scale** of {column.title}: {', '.join(parts)}." if parts else ""

@@ -14,7 +14,6 @@ from reports.aggregate import Estimate, estimate, tie_groups
 from reports.context import judge_summary
 from reports.formatting import number, one_line
 from reports.paper_table import PaperCell, PaperColumn, PaperRow, PaperTable
-from reports.records import Measurement
 from reports.rows import GroupKey, Row, StoredRecord, groups, rows_of
 from reports.tables import build_table
 
@@ -181,14 +180,10 @@ def _estimate(row: Row, metric: str, slice_name: str) -> Estimate | None:
     found = estimate(row, metric, slice_name or "all")
     if found is None or not detail:
         return found
-    values = [value for item in row.measurements(metric, slice_name) if (value := _detail(item, detail)) is not None]
+    values = [item.details[detail] for item in row.measurements(metric, slice_name) if detail in item.details]
     if not values:
         return None
     return replace(found, value=sum(values) / len(values), low=None, high=None, seed_sd=None)
-
-
-def _detail(measurement: Measurement, name: str) -> float | None:
-    return measurement.details.get(name)
 
 
 def _ranks(column: PaperColumn, rows: Sequence[Row]) -> dict[str, int]:

@@ -48,6 +48,7 @@ from reports.records import (
     read_samples,
     samples_path,
 )
+from reports.rows import record_paths
 
 Verdict = Literal["pass", "fail", "cannot check"]
 RESCORE_TOLERANCE = 1e-4
@@ -112,8 +113,7 @@ def verify(request: VerifyRequest, progress: Progress) -> list[Claim]:
 def _record_paths(folder: Path) -> list[Path]:
     if folder.is_file():
         return [folder]
-    place = folder / "records" if (folder / "records").is_dir() else folder
-    paths = sorted(path for path in place.rglob("*.json") if not path.name.startswith("."))
+    paths = record_paths(folder)
     if not paths:
         raise BadConfig("no records there", where=str(folder), remedy="give a record, a folder of records or a run")
     return paths

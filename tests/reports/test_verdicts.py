@@ -42,7 +42,7 @@ def test_the_trick_neither_copies_nor_idles_nor_is_real(table: Table) -> None:
 
 
 def test_sentences_name_leaders_copiers_and_the_scale(table: Table) -> None:
-    said = "\n".join(sentences(table))
+    said = "\n".join(sentences(table, verdict_of(table)))
     assert "**Leads** on joint recognition (a tie" in said
     assert "**Only copy** (no rank, whatever they score): Cheater." in said
     assert "**Not separable from doing nothing:** Idle." in said
@@ -51,12 +51,12 @@ def test_sentences_name_leaders_copiers_and_the_scale(table: Table) -> None:
 
 def test_a_table_of_anchors_only_says_so(tmp_path: Path) -> None:
     [found] = tables_of_run(write_run(tmp_path, ANCHORS, FakeTasks(n=60, n_clusters=12)))
-    assert sentences(found)[0].startswith("No method is ranked in this table yet")
+    assert sentences(found, verdict_of(found))[0].startswith("No method is ranked in this table yet")
 
 
 def test_a_table_without_any_number_still_prints(tmp_path: Path) -> None:
     [found] = tables_of_run(write_run(tmp_path, METHODS[-1:], FakeTasks(n=60, n_clusters=12)))
-    assert sentences(found) == ["No row of this table has finished."]
+    assert sentences(found, verdict_of(found)) == ["No row of this table has finished."]
     assert "no answer within 60 s" in render(found, "md") and "timeout" in render(found, "csv")
 
 
@@ -106,7 +106,7 @@ def test_plain_fmd_is_shown_to_prefer_rows_without_merit(tmp_path: Path) -> None
     flattered = replace(ANCHORS[3], conditional_kid=0.001)
     assert flattered.name == "copy-content"
     [found] = tables_of_run(write_run(tmp_path, (ANCHORS[1], flattered), FakeTasks(n=60, n_clusters=12)))
-    assert "these would beat real disjoint 1.03: copy content 1.00" in sentences(found)[-1]
+    assert "these would beat real disjoint 1.03: copy content 1.00" in sentences(found, verdict_of(found))[-1]
 
 
 def test_a_warning_of_a_whole_column_stands_at_its_header_once(tmp_path: Path) -> None:
