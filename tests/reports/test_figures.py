@@ -10,6 +10,7 @@ from matplotlib.image import imread
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 
+from reports.attention_figure import attention_figure
 from reports.curves import TrainingCurves, loss_figure
 from reports.figures import interval_bars, recognition_scatter, save_figure
 from reports.records import BadRecord
@@ -116,3 +117,17 @@ def test_logarithmic_axes_are_labelled_with_plain_numbers() -> None:
     figure.canvas.draw()
     labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert "0.01" in labels and "10" in labels and not any("$" in label for label in labels)
+
+
+def test_attention_figure_has_a_panel_a_part_and_says_what_even_attention_is() -> None:
+    even = np.full((30, 60), 1 / 60)
+    figure = attention_figure(
+        {"walk as run": {"spine": even, "left_arm": even}, "run as walk": {"spine": even, "left_arm": even}}, 30.0
+    )
+    images = [image for axes in figure.axes for image in axes.images]
+    assert len(images) == 4
+    for image in images:
+        np.testing.assert_allclose(np.asarray(image.get_array()), 1.0)
+        assert list(image.get_extent()) == [0.0, 2.0, 1.0, 0.0]
+    words = {text.get_text() for text in figure.findobj(Text)}
+    assert {"spine", "left arm", "attention (1: spread evenly)"} <= words

@@ -11,6 +11,8 @@ import torch
 from bench.adapters.motion_puzzle import MOTION_PUZZLE, Puzzle, PuzzleReleased, PuzzleWholeBody
 from bench.datasets.procedural import unseen_takes
 from bench.datasets.take import Take
+from bench.errors import BadConfig
+from bench.methods.motion_puzzle.attention_maps import attention_maps
 from bench.methods.motion_puzzle.features import clip_from_puzzle, puzzle_features
 from bench.methods.motion_puzzle.motion_puzzle import random_crop
 from bench.motion.edit import crop, resample
@@ -121,6 +123,29 @@ def test_the_released_form_has_twelve_channels_and_keeps_the_contents_path(takes
     assert adapter.config.shape.in_channels == 12
     answer = adapter.transfer(takes[0], takes[-1], rng=rng())
     np.testing.assert_allclose(answer.root_xyz_m[:, [0, 2]], takes[0].clip.root_xyz_m[:, [0, 2]], atol=1e-9)
+
+
+def test_attention_maps_have_a_row_a_content_frame_that_sums_to_one(fitted: Puzzle, takes: list[Take]) -> None:
+    content, style = crop(takes[0].clip, 0, 32), crop(takes[-1].clip, 0, 48)
+    maps = attention_maps(fitted.network, content, style)
+    assert list(maps) == ["left_leg", "right_leg", "spine", "left_arm", "right_arm"]
+    for shares in maps.values():
+        assert shares.shape == (32, 48)
+        np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=1e-5)
+    assert not any(layer._forward_pre_hooks for layer in fitted.network.network.modules())
+
+
+def test_attention_that_is_cut_off_with_the_padding_is_missing(fitted: Puzzle, takes: list[Take]) -> None:
+    maps = attention_maps(fitted.network, crop(takes[0].clip, 0, 30), crop(takes[-1].clip, 0, 46))
+    assert maps["spine"].shape == (30, 46)
+    assert (maps["spine"].sum(axis=1) < 1.0).all()
+
+
+def test_variants_without_attention_have_no_maps(takes: list[Take]) -> None:
+    adapter = PuzzleWholeBody()
+    adapter.fit(takes, seed=0, budget="smoke", progress=silent)
+    with pytest.raises(BadConfig, match="no attention on the graph of joints"):
+        attention_maps(adapter.network, takes[0].clip, takes[-1].clip)
 
 
 def test_rows_have_names_of_their_own() -> None:
