@@ -22,22 +22,29 @@ def losses_of(
 
     The released code has no root loss, halves the cycle terms, and has no style cycle where styles were mixed.
     """
-    content, other_content = network.content(source), network.content(target)
-    style, other_style = network.style(source), network.style(target)
-    rebuilt = network.decode(content, whole_body(style))
-    other_rebuilt = network.decode(other_content, whole_body(other_style))
-    mixed = network.decode(content, mixed_styles(style, other_style, from_source))
-    cycle = network.decode(network.content(mixed), whole_body(style))
+    content, other_content = network.content(torch.cat([source, target])).chunk(2)
+    style, other_style = halves(network.style(torch.cat([source, target])))
+    style_cycle = not (faithful_to_code and from_source)
+    pairs = [
+        (content, whole_body(style)),
+        (other_content, whole_body(other_style)),
+        (content, mixed_styles(style, other_style, from_source)),
+    ]
+    if style_cycle and from_source:
+        pairs.append((content, whole_body(other_style)))
+    rebuilt, other_rebuilt, mixed, *more = network.decode_together(pairs)
+    transferred = more[0] if more else mixed
+    cycles = [(network.content(mixed), whole_body(style))]
+    if style_cycle:
+        cycles.append((other_content, whole_body(network.style(transferred))))
+    outputs = [rebuilt, other_rebuilt, *network.decode_together(cycles)]
+    wanted = [source, target, source, target][: len(outputs)]
+    errors = [functional.l1_loss(output, motion) for output, motion in zip(outputs, wanted, strict=True)]
     losses = {
-        "rec": functional.l1_loss(rebuilt, source) + functional.l1_loss(other_rebuilt, target),
-        "cyc": functional.l1_loss(cycle, source),
-        "sm": smoothness(rebuilt, source) + smoothness(other_rebuilt, target) + smoothness(cycle, source),
+        "rec": errors[0] + errors[1],
+        "cyc": torch.stack(errors[2:]).sum(),
+        "sm": torch.stack([smoothness(output, motion) for output, motion in zip(outputs, wanted, strict=True)]).sum(),
     }
-    if not (faithful_to_code and from_source):
-        transferred = network.decode(content, whole_body(other_style)) if from_source else mixed
-        other_cycle = network.decode(other_content, whole_body(network.style(transferred)))
-        losses["cyc"] = losses["cyc"] + functional.l1_loss(other_cycle, target)
-        losses["sm"] = losses["sm"] + smoothness(other_cycle, target)
     if not faithful_to_code:
         losses["root"] = root_loss(mixed, source)
     return losses
@@ -56,6 +63,12 @@ def root_loss(output: Tensor, source: Tensor) -> Tensor:
 def smoothness(output: Tensor, motion: Tensor) -> Tensor:
     """Eq. 18: differences of successive frames."""
     return functional.l1_loss(output.diff(dim=2), motion.diff(dim=2))
+
+
+def halves(features: StyleFeatures) -> tuple[StyleFeatures, StyleFeatures]:
+    """Style features of two batches that were encoded as one."""
+    joint, mid, part, last = (level.chunk(2) for level in features)
+    return (joint[0], mid[0], part[0], last[0]), (joint[1], mid[1], part[1], last[1])
 
 
 def mixed_styles(style: StyleFeatures, other: StyleFeatures, from_source: tuple[int, ...]) -> PartStyles:

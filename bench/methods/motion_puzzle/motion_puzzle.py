@@ -13,15 +13,13 @@ from bench.methods.layers import Average
 from bench.methods.motion_puzzle.features import N_CHANNELS, N_JOINT_CHANNELS, clip_from_puzzle, puzzle_features
 from bench.methods.motion_puzzle.graphs import PART_NAMES
 from bench.methods.motion_puzzle.losses import drawn_parts, losses_of, weights_of
-from bench.methods.motion_puzzle.network import PartStyles, PuzzleNetwork, Shape, StyleFeatures
+from bench.methods.motion_puzzle.network import PartStyles, PuzzleNetwork, Shape, StyleFeatures, he_start
 from bench.methods.training import Curves, FitRequest, Stateful, Trainable, seeded, train
 from bench.methods.windows import FPS, Draws, Standardise, at_training_rate, cut_windows, padded_frames
 from bench.motion.clip import Clip
 from bench.motion.edit import resample
 
 LEAST_FRAMES, MULTIPLE = 12, 4
-WINDOW_FRAMES, STRIDE = 64, 32
-"""2 s at our 30 fps, for the paper's 120 and 60 frames at 60 fps."""
 
 Styles = Sequence[tuple[Clip, float]]
 """Target motions of one part with weights that sum to 1."""
@@ -36,6 +34,8 @@ class PuzzleConfig:
     channels, style_channels : width of the network, see :class:`Shape`.
     attention, by_part, real_time : the ablations of figure 17 and the variant of section 7.3.
     faithful_to_code : what the released code does differently: 12 channels, shared pooling, no root loss, ...
+    he_start : convolutions start with He's deviations; False for PyTorch's start, about a third of them.
+    n_frames, stride : of training windows; 2 s at our 30 fps for the paper's 120 and 60 frames at 60 fps.
     steps, batch : optimiser steps and windows a step; 10 epochs of 120,000 windows in the paper.
     rate : of RAdam.
     average : decay of the moving average of the weights that is used at test.
@@ -49,6 +49,9 @@ class PuzzleConfig:
     by_part: bool = True
     real_time: bool = False
     faithful_to_code: bool = False
+    he_start: bool = True
+    n_frames: int = 64
+    stride: int = 32
     steps: int = 37_500
     batch: int = 32
     rate: float = 1e-4
@@ -61,7 +64,10 @@ class PuzzleConfig:
         if budget == "smoke":
             return replace(self, channels=4, style_channels=8, steps=4, batch=4, rate=1e-3, average=0.5)
         if budget == "small":
-            return replace(self, channels=8, style_channels=16, steps=400, batch=8, rate=2e-3, average=0.99)
+            return replace(
+                self, channels=8, style_channels=16, he_start=False, n_frames=32, stride=16, steps=1600, batch=8,
+                rate=5e-3, average=0.995,
+            )  # fmt: skip
         return self
 
     @property
@@ -85,6 +91,8 @@ class MotionPuzzle(nn.Module):
         self.config = config
         self.standardise = Standardise(config.shape.in_channels)
         self.network = PuzzleNetwork(config.shape)
+        if config.he_start:
+            self.network.apply(he_start)
 
     @torch.inference_mode()
     def transfer(self, content: Clip, styles: Mapping[str, Styles]) -> Clip:
@@ -132,8 +140,8 @@ def train_puzzle(config: PuzzleConfig, request: FitRequest) -> tuple[PuzzleConfi
     windows = cut_windows(
         request.takes,
         lambda clip: puzzle_features(clip)[0],
-        n_frames=WINDOW_FRAMES,
-        stride=STRIDE,
+        n_frames=config.n_frames,
+        stride=config.stride,
         mirrored=True,
     )
     motions = windows.features[..., : config.shape.in_channels].to(request.device)

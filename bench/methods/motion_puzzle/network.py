@@ -196,15 +196,19 @@ class PartAttention(nn.Module):
 class BpStyleNet(nn.Module):
     """BP-StyleNet on one graph (section 4.4, Table 3 d): BP-AdaIN, STConv, BP-ATN, STConv."""
 
+    nodes: Tensor
+
     def __init__(
         self, shape: Shape, level: Level, in_channels: int, out_channels: int, kernel: int, *, active: bool
     ) -> None:
         super().__init__()
         subsets = len(level.partition)
-        self.parts = level.parts if shape.by_part else (tuple(range(level.partition.shape[1])),)
-        self.adain = nn.ModuleList([PartAdaIN(in_channels, shape.style_channels) for _ in self.parts])
+        parts = level.parts if shape.by_part else (tuple(range(level.partition.shape[1])),)
+        self.sizes = [len(part) for part in parts]
+        self.register_buffer("nodes", torch.tensor([node for part in parts for node in part]), persistent=False)
+        self.adain = nn.ModuleList([PartAdaIN(in_channels, shape.style_channels) for _ in parts])
         self.first = StConv(in_channels, in_channels, subsets, kernel, active=active)
-        self.attention = nn.ModuleList([PartAttention(in_channels) for _ in self.parts if shape.attention])
+        self.attention = nn.ModuleList([PartAttention(in_channels) for _ in parts if shape.attention])
         self.second = StConv(in_channels, out_channels, subsets, kernel, active=False)
 
     def forward(self, x: Tensor, styles: PartStyles, level: int, adjacency: Tensor) -> Tensor:
@@ -217,11 +221,11 @@ class BpStyleNet(nn.Module):
 
     def _by_part(self, modules: nn.ModuleList, x: Tensor, styles: PartStyles, level: int) -> Tensor:
         """Eq. 8 and 11: each part of ``x`` with the same part of its own style."""
-        result = torch.empty_like(x)
-        for nodes, module, style in zip(self.parts, modules, styles, strict=False):
-            own = [(features[level][..., nodes], weight) for features, weight in style]
-            result[..., nodes] = module(x[..., nodes], own)
-        return result
+        found = []
+        for nodes, module, style in zip(torch.split(self.nodes, self.sizes), modules, styles, strict=False):
+            own = [(features[level].index_select(3, nodes), weight) for features, weight in style]
+            found.append(module(x.index_select(3, nodes), own))
+        return torch.cat(found, dim=3).index_select(3, self.nodes.argsort())
 
 
 class Decoder(nn.Module):
@@ -277,7 +281,7 @@ class PuzzleNetwork(nn.Module):
         self.content_encoder = Encoder(shape, normalised=True)
         self.style_encoder = Encoder(shape, normalised=False)
         self.decoder = Decoder(shape)
-        self.apply(_initialise)
+        self.apply(_start_of_linear_layers)
 
     def content(self, motion: Tensor) -> Tensor:
         """E_c (eq. 6)."""
@@ -294,18 +298,35 @@ class PuzzleNetwork(nn.Module):
         motion: Tensor = self.decoder(content, styles)
         return motion
 
+    def decode_together(self, pairs: Sequence[tuple[Tensor, PartStyles]]) -> tuple[Tensor, ...]:
+        """Several batches of content features, each part of each in one style, decoded as one batch."""
+        contents, styles = zip(*pairs, strict=True)
+        joined: PartStyles = [
+            [(_joined([mixture[0][0] for mixture in part]), 1.0)] for part in zip(*styles, strict=True)
+        ]
+        motions = torch.split(self.decode(torch.cat(contents), joined), [len(content) for content in contents])
+        return tuple(motions)
+
+
+def _joined(styles: Sequence[StyleFeatures]) -> StyleFeatures:
+    joint, mid, part, last = (torch.cat(features) for features in zip(*styles, strict=True))
+    return joint, mid, part, last
+
 
 def whole_body(style: StyleFeatures) -> PartStyles:
     """One target motion for all five parts."""
     return [[(style, 1.0)]] * 5
 
 
-def _initialise(module: nn.Module) -> None:
+def he_start(module: nn.Module) -> None:
+    """Convolutions as in the released code: He's normal deviations, biases zero."""
     if isinstance(module, nn.Conv2d):
         nn.init.kaiming_normal_(module.weight)
-    elif isinstance(module, nn.Linear):
+        if module.bias is not None:
+            nn.init.zeros_(module.bias)
+
+
+def _start_of_linear_layers(module: nn.Module) -> None:
+    if isinstance(module, nn.Linear):
         nn.init.normal_(module.weight, std=0.02)
-    else:
-        return
-    if module.bias is not None:
         nn.init.zeros_(module.bias)

@@ -116,7 +116,9 @@ class ParkConfig:
             return replace(
                 short, width=4, style_dim=8, hidden_dim=16, n_steps=4, batch=4, average=0.5, classifier_steps=3
             )
-        return replace(short, width=24, hidden_dim=128, n_steps=1200, average=0.99, classifier_steps=250)
+        return replace(
+            short, width=24, hidden_dim=128, n_frames=32, stride=16, n_steps=2600, average=0.99, classifier_steps=250
+        )
 
     @property
     def size(self) -> NetworkSize:
