@@ -61,6 +61,9 @@ def run(
     data: Annotated[
         list[str] | None, typer.Option(help="Dataset as NAME or NAME=PATH; repeat for several. Default: procedural.")
     ] = None,
+    foreign: Annotated[
+        str, typer.Option(help="NAME or NAME=PATH: contents of the foreign condition; default: the other --data.")
+    ] = "",
     methods: Annotated[str, typer.Option(help="Comma-separated names; default: all anchor rows.")] = "",
     adapter: Annotated[list[str] | None, typer.Option(help="Your adapter, FILE.py or FILE.py:Class.")] = None,
     tracks: Annotated[str, typer.Option(help="Comma-separated tracks; default: transfer.")] = "",
@@ -99,6 +102,7 @@ def run(
 
     request = asked.RunRequest(
         data=datasets_of(data or ["procedural"]),
+        foreign=datasets_of([foreign] if foreign else []),
         overrides=overrides_of(unit, up, fps),
         out=out or asked.default_out(RUNS),
         store=store,

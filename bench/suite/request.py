@@ -54,6 +54,7 @@ class RunRequest:
     seeds : methods that are trained run once with each; all other rows run once, with the first.
     device : where methods are trained, ``cpu`` or ``cuda``; weights of one are not those of the other.
     command : as typed, for the records.
+    foreign : as ``data``, of datasets that only give the contents of the foreign condition and have no rows.
     """
 
     data: dict[str, Path | None]
@@ -76,6 +77,7 @@ class RunRequest:
     limits: Limits = field(default_factory=Limits)
     command: str = ""
     overrides: Overrides | None = None
+    foreign: dict[str, Path | None] = field(default_factory=dict)
 
 
 def sources_of(request: RunRequest) -> list[AdapterSource]:
@@ -169,6 +171,9 @@ def check_request(request: RunRequest) -> None:
     BadConfig : unknown protocols, seeds that are none, or folders that cannot be written.
     """
     protocols_of(request)
+    both = sorted(set(request.data) & set(request.foreign))
+    if both:
+        raise BadConfig(f"dataset {both[0]!r} is given to --data, too", where="--foreign", remedy="name it once")
     seeds = request.seeds
     if not seeds or len(set(seeds)) < len(seeds) or min(seeds) < 0:
         raise BadConfig(f"expected different numbers from 0 on, got {seeds}", where="--seeds")

@@ -97,7 +97,7 @@ def fresh_records_folder(out: Path) -> Path:
 def _loaded(request: RunRequest, progress: Progress) -> list[Dataset]:
     return [
         load_dataset(name, path, lambda what, done, total: progress("data", what, done, total), request.overrides)
-        for name, path in request.data.items()
+        for name, path in {**request.data, **request.foreign}.items()
     ]
 
 
@@ -105,8 +105,9 @@ def _settings(request: RunRequest, datasets: Sequence[Dataset], store: Store) ->
     """Every protocol on every dataset that can serve it; a run with one protocol refuses what it cannot serve."""
     protocols = protocols_of(request)
     settings, left_out = [], []
-    for dataset in datasets:
-        others = [other for other in datasets if other is not dataset]
+    for dataset in datasets[: len(request.data)]:
+        foreign = datasets[len(request.data) :]
+        others = [*foreign, *(other for other in datasets if other is not dataset)]
         for protocol in protocols:
             try:
                 setting = prepare(

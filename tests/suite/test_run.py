@@ -33,6 +33,7 @@ def request(folder: Path, **changes: object) -> RunRequest:
         ({"seeds": ()}, BadConfig, "expected different numbers from 0 on"),
         ({"out": Path("/dev/null/out")}, BadConfig, "cannot be written"),
         ({"store": Path("/dev/null/store")}, BadConfig, "cannot be written"),
+        ({"foreign": {"procedural": None}}, BadConfig, "'procedural' is given to --data, too"),
     ],
 )  # fmt: skip
 def test_bad_requests_are_refused_and_write_nothing(
@@ -79,3 +80,12 @@ def test_beside_other_rows_only_the_new_one_is_run(tmp_path: Path) -> None:
     alone = request(tmp_path, adapter_files=(str(file),), only_files=True)
     assert [source.name for source in sources_of(alone)] == ["mine"]
     assert len(sources_of(request(tmp_path, adapter_files=(str(file),)))) > 10
+
+
+def test_a_foreign_dataset_gives_contents_and_has_no_rows(tmp_path: Path, bandai_namco_zip: Path) -> None:
+    asked = request(
+        tmp_path, foreign={"bandai-namco": bandai_namco_zip}, methods=("copy-content",), tracks=(),
+        protocols=("stylebench-transfer@1/foreign",), profile="smoke",
+    )  # fmt: skip
+    [record] = run(asked, SILENT).records
+    assert (record.status, record.dataset, record.condition) == ("ok", "procedural@1", "foreign")
