@@ -72,7 +72,7 @@ class PuzzleReleased(Puzzle):
     name = "motion-puzzle-released"
     title = "Motion Puzzle 2022, as released"
     description = "Motion Puzzle as its released code has it: no root features, shared pooling, other weights"
-    variant: ClassVar[Mapping[str, Any]] = {"faithful_to_code": True}
+    variant: ClassVar[Mapping[str, Any]] = {"faithful_to_code": True, "betas": (0.9, 0.999)}
 
 
 class PuzzleWithoutAttention(Puzzle):

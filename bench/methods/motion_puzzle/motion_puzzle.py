@@ -37,7 +37,7 @@ class PuzzleConfig:
     he_start : convolutions start with He's deviations; False for PyTorch's start, about a third of them.
     n_frames, stride : of training windows; 2 s at our 30 fps for the paper's 120 and 60 frames at 60 fps.
     steps, batch : optimiser steps and windows a step; 10 epochs of 120,000 windows in the paper.
-    rate : of RAdam.
+    rate, betas : of RAdam.
     average : decay of the moving average of the weights that is used at test.
     mixing : probability of mixing styles by part; not stated in the paper, 0.4 in the released code.
     cropping : share of windows that are sped up or slowed down (temporal random cropping).
@@ -55,6 +55,7 @@ class PuzzleConfig:
     steps: int = 37_500
     batch: int = 32
     rate: float = 1e-4
+    betas: tuple[float, float] = (0.0, 0.99)
     average: float = 0.999
     mixing: float = 0.4
     cropping: float = 0.2
@@ -65,8 +66,8 @@ class PuzzleConfig:
             return replace(self, channels=4, style_channels=8, steps=4, batch=4, rate=1e-3, average=0.5)
         if budget == "small":
             return replace(
-                self, channels=8, style_channels=16, he_start=False, n_frames=32, stride=16, steps=1600, batch=8,
-                rate=5e-3, average=0.995,
+                self, channels=16, style_channels=32, he_start=False, n_frames=32, stride=16, steps=1300, batch=4,
+                rate=4e-3, betas=(0.9, 0.99), average=0.99,
             )  # fmt: skip
         return self
 
@@ -172,10 +173,9 @@ class _PuzzleTraining(Trainable):
         self.motions = motions
         self.draws = draws
         self.generator = generator
-        betas = (0.9, 0.999) if self.config.faithful_to_code else (0.0, 0.99)
         decay = 1e-4 if self.config.faithful_to_code else 0.0
         self.optimiser = torch.optim.RAdam(
-            self.network.parameters(), lr=self.config.rate, betas=betas, weight_decay=decay
+            self.network.parameters(), lr=self.config.rate, betas=self.config.betas, weight_decay=decay
         )
         self.average = Average(self.network, self.config.average)
 
