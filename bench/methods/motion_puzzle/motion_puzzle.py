@@ -18,6 +18,7 @@ from bench.methods.training import Curves, FitRequest, Stateful, Trainable, seed
 from bench.methods.windows import FPS, Draws, Standardise, at_training_rate, cut_windows, padded_frames
 from bench.motion.clip import Clip
 from bench.motion.edit import resample
+from bench.motion.skeleton import N_JOINTS
 
 LEAST_FRAMES, MULTIPLE = 12, 4
 
@@ -35,6 +36,7 @@ class PuzzleConfig:
     attention, by_part, real_time : the ablations of figure 17 and the variant of section 7.3.
     faithful_to_code : what the released code does differently: 12 channels, shared pooling, no root loss, ...
     he_start : convolutions start with He's deviations; False for PyTorch's start, about a third of them.
+    by_joint : normalised with a mean of each joint, so that what tells joints apart in every motion is not learned.
     n_frames, stride : of training windows; 2 s at our 30 fps for the paper's 120 and 60 frames at 60 fps.
     steps, batch : optimiser steps and windows a step; 10 epochs of 120,000 windows in the paper.
     rate, betas : of RAdam.
@@ -50,6 +52,7 @@ class PuzzleConfig:
     real_time: bool = False
     faithful_to_code: bool = False
     he_start: bool = True
+    by_joint: bool = False
     n_frames: int = 64
     stride: int = 32
     steps: int = 37_500
@@ -66,8 +69,8 @@ class PuzzleConfig:
             return replace(self, channels=4, style_channels=8, steps=4, batch=4, rate=1e-3, average=0.5)
         if budget == "small":
             return replace(
-                self, channels=16, style_channels=32, he_start=False, n_frames=32, stride=16, steps=1300, batch=4,
-                rate=4e-3, betas=(0.9, 0.99), average=0.99,
+                self, channels=16, style_channels=32, he_start=False, by_joint=True, n_frames=32, stride=16,
+                steps=1500, batch=4, rate=4e-3, betas=(0.9, 0.99), average=0.99,
             )  # fmt: skip
         return self
 
@@ -90,7 +93,7 @@ class MotionPuzzle(nn.Module):
     def __init__(self, config: PuzzleConfig) -> None:
         super().__init__()
         self.config = config
-        self.standardise = Standardise(config.shape.in_channels)
+        self.standardise = Standardise(*((N_JOINTS,) if config.by_joint else ()), config.shape.in_channels)
         self.network = PuzzleNetwork(config.shape)
         if config.he_start:
             self.network.apply(he_start)
@@ -126,7 +129,7 @@ class MotionPuzzle(nn.Module):
         wanted = padded_frames(len(features), MULTIPLE, LEAST_FRAMES)
         while len(features) < wanted:
             features = np.concatenate([features, features[::-1]])[:wanted]
-        used = torch.from_numpy(features[..., : len(self.standardise.mean)].astype(np.float32))
+        used = torch.from_numpy(features[..., : self.config.shape.in_channels].astype(np.float32))
         standard: Tensor = self.standardise(used)
         return standard.permute(2, 0, 1)[None].contiguous()
 
@@ -156,11 +159,13 @@ def train_puzzle(config: PuzzleConfig, request: FitRequest) -> tuple[PuzzleConfi
 
 
 def _fit_scale(standardise: Standardise, motions: Tensor) -> None:
-    """Mean per channel over joints and frames; one deviation for each triple of coordinates, and for root and turn."""
+    """Mean of each channel; one deviation from it for each triple of coordinates, for the root's velocity and turn."""
     standardise.fit(motions)
+    deviation = (motions - standardise.mean).flatten(0, 2).std(dim=0, correction=0)
     groups = [slice(start, start + 3) for start in range(0, 12, 3)] + [slice(12, 14)]
     for group in groups[: len(groups) if motions.shape[-1] == N_CHANNELS else 4]:
-        standardise.deviation[group] = standardise.deviation[group].mean()
+        deviation[group] = deviation[group].mean()
+    standardise.deviation.copy_(deviation.expand_as(standardise.deviation))
 
 
 class _PuzzleTraining(Trainable):
