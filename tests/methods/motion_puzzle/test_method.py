@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from bench.datasets.take import Take
 from bench.errors import BadConfig
 from bench.methods.motion_puzzle.attention_maps import attention_maps
 from bench.methods.motion_puzzle.features import clip_from_puzzle, puzzle_features
-from bench.methods.motion_puzzle.motion_puzzle import random_crop
+from bench.methods.motion_puzzle.motion_puzzle import PuzzleConfig, random_crop, train_puzzle
+from bench.methods.training import FitRequest
 from bench.motion.edit import crop, resample
 from bench.motion.kinematics import world_positions
 
@@ -123,6 +125,21 @@ def test_the_released_form_has_twelve_channels_and_keeps_the_contents_path(takes
     assert adapter.config.shape.in_channels == 12
     answer = adapter.transfer(takes[0], takes[-1], rng=rng())
     np.testing.assert_allclose(answer.root_xyz_m[:, [0, 2]], takes[0].clip.root_xyz_m[:, [0, 2]], atol=1e-9)
+
+
+@pytest.mark.parametrize("by_joint", [False, True])
+def test_one_deviation_a_triple_of_coordinates_and_at_will_a_mean_a_joint(takes: list[Take], by_joint: bool) -> None:
+    config = replace(PuzzleConfig(by_joint=by_joint).at("smoke"), steps=1)
+    _, model, _ = train_puzzle(config, FitRequest(takes, 0, "smoke", "cpu", None, silent))
+    standardise = model.standardise
+    assert standardise.mean.shape == standardise.deviation.shape == ((21, 15) if by_joint else (15,))
+    deviation = standardise.deviation.reshape(-1, 15)
+    np.testing.assert_array_equal(deviation[:, [0, 3, 6, 9, 12]], deviation[:, [2, 5, 8, 11, 13]])
+    np.testing.assert_array_equal(deviation, deviation[:1].expand_as(deviation))
+    head = 12
+    standing = np.mean([puzzle_features(take.clip)[0][:, head, 1].mean() for take in takes])
+    mean_height = float(standardise.mean.reshape(-1, 15)[head if by_joint else 0, 1])
+    assert (abs(mean_height - standing) < 0.05) == by_joint
 
 
 def test_attention_maps_have_a_row_a_content_frame_that_sums_to_one(fitted: Puzzle, takes: list[Take]) -> None:
