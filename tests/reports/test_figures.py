@@ -10,9 +10,9 @@ from matplotlib.image import imread
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 
-from reports.attention_figure import attention_figure
 from reports.curves import TrainingCurves, loss_figure
 from reports.figures import interval_bars, recognition_scatter, save_figure
+from reports.puzzle_figures import attention_figure, part_change_figure
 from reports.records import BadRecord
 from reports.tables import Table, tables_of_run
 from tests.reports.factory import ANCHORS, METHODS, FakeMethod, FakeTasks, write_run
@@ -131,3 +131,11 @@ def test_attention_figure_has_a_panel_a_part_and_says_what_even_attention_is() -
         assert list(image.get_extent()) == [0.0, 2.0, 1.0, 0.0]
     words = {text.get_text() for text in figure.findobj(Text)}
     assert {"spine", "left arm", "attention (1: spread evenly)"} <= words
+
+
+def test_part_change_figure_writes_each_number_where_it_belongs() -> None:
+    changes = {"by part": {"legs": {"legs": 8.0, "arms": 0.5}, "arms": {"legs": 0.25, "arms": 6.0}}}
+    [panel] = part_change_figure(changes).axes
+    written = {text.get_text(): text.get_position() for text in panel.texts}
+    assert written == {"8.0": (0, 0), "0.5": (1, 0), "0.2": (0, 1), "6.0": (1, 1)}
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["legs", "arms"]
