@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--whole-body", required=True, type=Path, help="the same of motion-puzzle-stgcn-adain")
     parser.add_argument("--pairs", type=int, default=60, help="of test motions, for the changes by part")
     parser.add_argument("--contents", default="walk:normal,run:active", help="CONTENT:STYLE of test takes, by comma")
-    parser.add_argument("--styles", default="walk:elderly,walk:youthful", help="one for each content")
+    parser.add_argument("--styles", default="walk:youthful,run:exhausted", help="one for each content")
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
     name, _, path = asked.data.partition("=")
@@ -78,7 +78,11 @@ def part_changes(method: Puzzle, motions: Sequence[tuple[Take, Take]]) -> dict[s
 
 def _longest(takes: Sequence[Take], wanted: str) -> Take:
     content, _, style = wanted.partition(":")
-    return max((t for t in takes if t.content == content and t.style == style), key=lambda t: t.clip.n_frames)
+    found = [take for take in takes if (take.content, take.style) == (content, style)]
+    if not found:
+        cells = sorted({f"{take.content}:{take.style}" for take in takes})
+        raise SystemExit(f"no test take of {wanted}; there are {', '.join(cells)}")
+    return max(found, key=lambda take: take.clip.n_frames)
 
 
 def _piece(take: Take) -> Clip:
