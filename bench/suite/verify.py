@@ -381,10 +381,6 @@ def _cell(record: Record) -> Cell:
     )
 
 
-def _tolerance(metric: str) -> float:
-    return COUNT_TOLERANCE if metric in COUNTED else RESCORE_TOLERANCE
-
-
 def _same_array(name: str, one: NDArray[Any] | None, other: NDArray[Any] | None) -> bool:
     if one is None or other is None or one.shape != other.shape or one.dtype != other.dtype:
         return False
@@ -392,10 +388,11 @@ def _same_array(name: str, one: NDArray[Any] | None, other: NDArray[Any] | None)
         # Judges of another arithmetic may change their mind on a sample that stands between two classes.
         return bool(np.mean(one != other) <= 1e-3) if one.dtype.kind == "i" else bool(np.array_equal(one, other))
     metric = name.partition("/")[2].partition("|")[0]
+    floor = COUNT_TOLERANCE if metric in COUNTED else RESCORE_TOLERANCE
     if name.startswith("per_sample/") and metric in COUNTED:
         same_gaps = bool(np.array_equal(np.isnan(one), np.isnan(other)))
         return same_gaps and bool(np.nanmean(np.abs(one - other)) <= COUNT_TOLERANCE)
-    return bool(np.allclose(one, other, rtol=RESCORE_TOLERANCE, atol=_tolerance(metric), equal_nan=True))
+    return bool(np.allclose(one, other, rtol=RESCORE_TOLERANCE, atol=floor, equal_nan=True))
 
 
 def _same_number(said: Measurement | None, found: Measurement | None, exact: bool) -> bool:
@@ -406,7 +403,7 @@ def _same_number(said: Measurement | None, found: Measurement | None, exact: boo
     if _without_numbers(said) != _without_numbers(found):
         return False
     pairs = [(said.value, found.value), (said.low, found.low), (said.high, found.high), (said.floor, found.floor)]
-    return all(_close(one, other, _tolerance(said.name)) for one, other in pairs)
+    return all(_close(said.name, one, other) for one, other in pairs)
 
 
 def _without_numbers(measurement: Measurement) -> Measurement:
@@ -422,10 +419,11 @@ def _without_numbers(measurement: Measurement) -> Measurement:
     return measurement.model_copy(update={**numbers, "reason": ""})
 
 
-def _close(one: float | None, other: float | None, tolerance: float) -> bool:
+def _close(metric: str, one: float | None, other: float | None) -> bool:
     if one is None or other is None:
         return one is other
-    return bool(abs(one - other) <= tolerance * max(1.0, abs(one)))
+    allowed = COUNT_TOLERANCE if metric in COUNTED else RESCORE_TOLERANCE * max(1.0, abs(one))
+    return bool(abs(one - other) <= allowed)
 
 
 def table_of(claims: Sequence[Claim]) -> list[list[str]]:
