@@ -1,10 +1,9 @@
 from __future__ import annotations
 
+import multiprocessing
 import shutil
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Barrier
 
 import numpy as np
 import pytest
@@ -102,15 +101,23 @@ def test_entry_of_another_process_stays(own_cache: Path) -> None:
 
 
 def test_many_at_once(own_cache: Path) -> None:
-    start = Barrier(6)
+    """Six processes find nothing, make the takes at the same moment, and all get them; one entry is left."""
+    processes = multiprocessing.get_context("fork")
+    start = processes.Barrier(6)
 
     def make_together() -> Made:
         start.wait(timeout=20)
         return Maker()()
 
-    with ThreadPoolExecutor(6) as pool:
-        for found in pool.map(lambda _: cached_takes("key", make_together), range(6)):
-            assert_made(found)
+    def read() -> None:
+        assert_made(cached_takes("key", make_together))
+
+    readers = [processes.Process(target=read) for _ in range(6)]
+    for reader in readers:
+        reader.start()
+    for reader in readers:
+        reader.join(timeout=60)
+    assert [reader.exitcode for reader in readers] == [0] * 6
     assert [folder.name for folder in own_cache.iterdir()] == ["key"]
 
 
