@@ -37,9 +37,9 @@ from bench.suite.session import Progress, session_of
 from bench.suite.setting import Setting, prepare
 from bench.suite.setting_run import SettingRun
 from bench.suite.store import Store
+from bench.suite.tolerance import RESCORE_TOLERANCE, same_array, same_number
 from reports.records import (
     BadRecord,
-    Measurement,
     Record,
     digest_of,
     digest_of_arrays,
@@ -51,12 +51,6 @@ from reports.records import (
 from reports.rows import record_paths
 
 Verdict = Literal["pass", "fail", "cannot check"]
-RESCORE_TOLERANCE = 1e-4
-"""Relative, for numbers scored again where the arithmetic of this machine is not bit for bit that of the record."""
-COUNTED = ("joint_range",)
-"""Metrics in percent that count places beyond a limit: one that stands on it may fall to either side elsewhere."""
-COUNT_TOLERANCE = 0.1
-"""Percentage points, for those."""
 GENERATE_TOLERANCE = 1e-5
 """Of quaternion components and metres, for motions generated again."""
 SUBMISSION_FILE = "submission.toml"
@@ -287,7 +281,7 @@ class _Verifier:
         if exact:
             self._say("samples", "pass", f"exact: all {len(scored)} arrays, bit for bit")
             return
-        wrong = sorted(name for name in {*arrays, *scored} if not _same_array(name, arrays.get(name), scored.get(name)))
+        wrong = sorted(name for name in {*arrays, *scored} if not same_array(name, arrays.get(name), scored.get(name)))
         if wrong:
             self._say("samples", "fail", f"scored again they differ: {', '.join(wrong[:6])}")
         else:
@@ -297,7 +291,7 @@ class _Verifier:
         """Where all arrays are bit for bit the recorded ones, so must be the numbers."""
         ours = {(item.name, item.slice): item for item in again.measurements}
         theirs = {(item.name, item.slice): item for item in record.measurements}
-        wrong = [key for key in {**theirs, **ours} if not _same_number(theirs.get(key), ours.get(key), exact)]
+        wrong = [key for key in {**theirs, **ours} if not same_number(theirs.get(key), ours.get(key), exact)]
         for key in wrong:
             said, found = theirs.get(key), ours.get(key)
             self._say(
@@ -379,51 +373,6 @@ def _cell(record: Record) -> Cell:
         motions_key=digest_of({"pack": record.motions_digest}),
         given=known is None or not issubclass(known, Oracle),
     )
-
-
-def _same_array(name: str, one: NDArray[Any] | None, other: NDArray[Any] | None) -> bool:
-    if one is None or other is None or one.shape != other.shape or one.dtype != other.dtype:
-        return False
-    if one.dtype.kind != "f":
-        # Judges of another arithmetic may change their mind on a sample that stands between two classes.
-        return bool(np.mean(one != other) <= 1e-3) if one.dtype.kind == "i" else bool(np.array_equal(one, other))
-    metric = name.partition("/")[2].partition("|")[0]
-    floor = COUNT_TOLERANCE if metric in COUNTED else RESCORE_TOLERANCE
-    if name.startswith("per_sample/") and metric in COUNTED:
-        same_gaps = bool(np.array_equal(np.isnan(one), np.isnan(other)))
-        return same_gaps and bool(np.nanmean(np.abs(one - other)) <= COUNT_TOLERANCE)
-    return bool(np.allclose(one, other, rtol=RESCORE_TOLERANCE, atol=floor, equal_nan=True))
-
-
-def _same_number(said: Measurement | None, found: Measurement | None, exact: bool) -> bool:
-    if said is None or found is None:
-        return False
-    if exact:
-        return said == found
-    if _without_numbers(said) != _without_numbers(found):
-        return False
-    pairs = [(said.value, found.value), (said.low, found.low), (said.high, found.high), (said.floor, found.floor)]
-    return all(_close(said.name, one, other) for one, other in pairs)
-
-
-def _without_numbers(measurement: Measurement) -> Measurement:
-    """What is left must be equal on every machine."""
-    numbers: dict[str, object] = {
-        "value": None,
-        "low": None,
-        "high": None,
-        "floor": None,
-        "judge_values": (),
-        "details": {},
-    }
-    return measurement.model_copy(update={**numbers, "reason": ""})
-
-
-def _close(metric: str, one: float | None, other: float | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    allowed = COUNT_TOLERANCE if metric in COUNTED else RESCORE_TOLERANCE * max(1.0, abs(one))
-    return bool(abs(one - other) <= allowed)
 
 
 def table_of(claims: Sequence[Claim]) -> list[list[str]]:
