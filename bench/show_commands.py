@@ -108,7 +108,7 @@ def _player(
     kept = Store(store.absolute())
     folders = motions_folders(kept)
     for found in tables_of_run(run_folder):
-        rows = {row.row.method.name for row in found.rows if row.row.ok}
+        rows = {row.row.method.row_name for row in found.rows if row.row.ok}
         if stem_of(found.key).startswith(table) and set(names) <= rows:
             player = player_of(run_folder, found, kept, folders, names=names, sample_ids=sample_ids)
             if player is not None and set(names) <= set(player.bodies):

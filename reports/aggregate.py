@@ -164,7 +164,7 @@ def _check_same_samples(row_a: Row, row_b: Row) -> None:
 
 
 def tie_groups(rows: Sequence[Row], metric: str, slice_name: str) -> dict[str, int]:
-    """Rank of each method that can carry one, by method name; methods that are not separable share a rank.
+    """Rank of each method that can carry one, by row name; methods that are not separable share a rank.
 
     Ranked are rows of kind method with status ok, not marked ``copies``, with a value and replicates. Every two of
     them are compared (:func:`paired_difference`); two are *separable* if Holm's adjusted p over all these comparisons
@@ -178,7 +178,7 @@ def tie_groups(rows: Sequence[Row], metric: str, slice_name: str) -> dict[str, i
     separable = np.zeros((len(ranked), len(ranked)), dtype=np.bool_)
     for (a, b), p in zip(pairs, adjusted, strict=True):
         separable[a, b] = separable[b, a] = p < SIGNIFICANCE
-    return {row.method.name: rank for row, rank in zip(ranked, leader_ranks(separable), strict=True)}
+    return {row.method.row_name: rank for row, rank in zip(ranked, leader_ranks(separable), strict=True)}
 
 
 def ranked_order(rows: Sequence[Row], metric: str, slice_name: str) -> list[Row]:
@@ -189,7 +189,7 @@ def ranked_order(rows: Sequence[Row], metric: str, slice_name: str) -> list[Row]
 
 def sorted_rows(rows: Iterable[Row], metric: str, slice_name: str) -> list[Row]:
     """Rows best first by one metric; rows without a value last; ties in order of method name."""
-    return sorted(rows, key=lambda row: (badness(row, metric, slice_name), row.method.name))
+    return sorted(rows, key=lambda row: (badness(row, metric, slice_name), row.method.row_name))
 
 
 def badness(row: Row, metric: str, slice_name: str) -> float:
@@ -220,4 +220,4 @@ def front(rows: Sequence[Row], metrics: Sequence[str], slice_name: str) -> tuple
     points = np.array([[-badness(row, metric, slice_name) for metric in metrics] for row in rows]).reshape(
         len(rows), len(metrics)
     )
-    return tuple(row.method.name for row, on_front in zip(rows, pareto_front(points), strict=True) if on_front)
+    return tuple(row.method.row_name for row, on_front in zip(rows, pareto_front(points), strict=True) if on_front)

@@ -121,7 +121,7 @@ def _is_local(record: Record) -> bool:
 
 
 def _left_out(stored: Sequence[StoredRecord]) -> list[str]:
-    names = {(record.method.title, record.dataset) for record, _ in stored if _is_local(record)}
+    names = {(record.method.row_title, record.dataset) for record, _ in stored if _is_local(record)}
     return [f"{escape_markdown(title)} on {escape_markdown(dataset)}" for title, dataset in sorted(names)]
 
 

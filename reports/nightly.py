@@ -85,9 +85,9 @@ def compare_nights(before: Path, now: Path, alpha: float = FAMILY_WISE) -> Compa
         if table.key not in earlier:
             apart[table.title] = "the night before has no such table"
             continue
-        rows = {row.row.method.name: row.row for row in earlier[table.key].rows}
+        rows = {row.row.method.row_name: row.row for row in earlier[table.key].rows}
         for row in table.rows:
-            name, old = row.row.method.name, rows.get(row.row.method.name)
+            name, old = row.row.method.row_name, rows.get(row.row.method.row_name)
             where = f"{name} in {table.title}"
             if old is None:
                 apart[where] = "new"
@@ -209,7 +209,7 @@ def night_of(name: str, good: bool, folder: Path) -> Night:
         for row in table.rows if column else ():
             found = row.estimates.get(column.key) if column else None
             if column and found is not None and found.value is not None:
-                values[f"{table.title} | {row.row.method.name} | {column.title}"] = found.value
+                values[f"{table.title} | {row.row.method.row_name} | {column.title}"] = found.value
     return Night(name, good, values)
 
 

@@ -22,6 +22,10 @@ SCHEMA_VERSION = 1
 Status = Literal["ok", "failed", "timeout", "oom", "invalid", "unsupported", "skipped"]
 Better = Literal["higher", "lower", "one", "none"]
 
+TRAINED_HERE = "fit part, budget "
+"""How ``trained_on`` starts where this benchmark trained the row; the budget follows, and a comma where more is said."""
+USUAL_BUDGET, PAPER_BUDGET = "small", "paper"
+
 
 class BadRecord(ValueError):
     """A record or samples file is missing, malformed, or does not belong together with the others."""
@@ -105,6 +109,23 @@ class MethodFacts(_Strict):
     """data, budget, training seeds in words; empty for untrained rows"""
     draws_from: str = ""
     """for anchors: which part their motions come from"""
+
+    @property
+    def budget(self) -> str:
+        """The training budget of a row that was trained here; empty for all others."""
+        head, _, rest = self.trained_on.partition(TRAINED_HERE)
+        return "" if head else rest.partition(",")[0]
+
+    @property
+    def row_name(self) -> str:
+        """What tells rows of a table apart: the name, and the budget where it is not the usual one."""
+        return f"{self.name}@{self.budget}" if self.budget not in ("", USUAL_BUDGET) else self.name
+
+    @property
+    def row_title(self) -> str:
+        """The title, or the name where there is none, with the same addition."""
+        title = self.title or self.name
+        return f"{title} ({self.budget} budget)" if self.budget not in ("", USUAL_BUDGET) else title
 
 
 class Provenance(_Strict):

@@ -138,7 +138,7 @@ def number_frame(table: Table) -> pd.DataFrame:
         line: dict[str, object] = {
             "section": row.section,
             "rank": row.rank,
-            "method": row.row.method.name,
+            "method": row.row.method.row_name,
             "title": row.title,
             "status": row.row.status,
             "marks": ";".join(row.marks),

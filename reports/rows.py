@@ -36,7 +36,7 @@ class GroupKey(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """All records of one method in one table: its seeds and trials."""
+    """All records of one method and training budget in one table: its seeds and trials."""
 
     method: MethodFacts
     stored: tuple[StoredRecord, ...]
@@ -116,7 +116,13 @@ def record_paths(folder: Path) -> list[Path]:
 
 
 def _order(record: Record) -> tuple[str, ...]:
-    return (*map(str, group_key(record)), record.method.name, f"{record.seed:09d}", f"{record.trial:09d}", record.key)
+    return (
+        *map(str, group_key(record)),
+        record.method.row_name,
+        f"{record.seed:09d}",
+        f"{record.trial:09d}",
+        record.key,
+    )
 
 
 def group_key(record: Record) -> GroupKey:
@@ -161,10 +167,10 @@ def check_comparable(stored: Sequence[StoredRecord]) -> None:
                 )
     cells: dict[tuple[str, int, int], Path] = {}
     for record, path in stored:
-        first_path = cells.setdefault((record.method.name, record.seed, record.trial), path)
+        first_path = cells.setdefault((record.method.row_name, record.seed, record.trial), path)
         if first_path != path:
             raise BadRecord(
-                f"{record.method.name} seed {record.seed} trial {record.trial} is there twice: "
+                f"{record.method.row_name} seed {record.seed} trial {record.trial} is there twice: "
                 f"{first_path.name} and {path.name}; move one of them away"
             )
 
@@ -179,8 +185,8 @@ def _identities(record: Record) -> Iterable[tuple[str, str]]:
 
 
 def rows_of(stored: Sequence[StoredRecord]) -> tuple[Row, ...]:
-    """One row per method, sorted by method name, from the records of one group."""
+    """One row per method and training budget, sorted by name, from the records of one group."""
     found: dict[str, list[StoredRecord]] = {}
     for item in stored:
-        found.setdefault(item.record.method.name, []).append(item)
+        found.setdefault(item.record.method.row_name, []).append(item)
     return tuple(Row(found[name][0].record.method, tuple(found[name])) for name in sorted(found))

@@ -58,7 +58,7 @@ class TableRow:
 
     @property
     def title(self) -> str:
-        return one_line(self.row.method.title) or self.row.method.name
+        return one_line(self.row.method.row_title)
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def build_table(key: GroupKey, stored: Sequence[StoredRecord]) -> Table:
     if columns:
         rows = tuple(sorted_rows(rows, columns[0].metric, columns[0].slice))
         ranks = tie_groups(rows, columns[0].metric, columns[0].slice)
-    table_rows = [_table_row(row, columns, ranks.get(row.method.name)) for row in rows]
+    table_rows = [_table_row(row, columns, ranks.get(row.method.row_name)) for row in rows]
     order: dict[Section, int] = {"methods": 0, "anchors": 1, "unfinished": 2}
     table_rows.sort(key=lambda row: order[row.section])
     found = [row.estimates[columns[0].key].n for row in table_rows if columns and columns[0].key in row.estimates]

@@ -77,11 +77,11 @@ def _better_than_all(
     found = [paired_difference(row.row, rival.row, column.metric, column.slice) for row, rival in pairs]
     adjusted = holm([1.0 if difference is None else difference.p for difference in found])
     beaten = {
-        (row.row.method.name, rival.row.method.name)
+        (row.row.method.row_name, rival.row.method.row_name)
         for (row, rival), difference, p in zip(pairs, found, adjusted, strict=True)
         if difference is not None and p < SIGNIFICANCE and sign * difference.value > 0.0
     }
-    return tuple(row for row in rows if all((row.row.method.name, r.row.method.name) in beaten for r in rivals))
+    return tuple(row for row in rows if all((row.row.method.row_name, r.row.method.row_name) in beaten for r in rivals))
 
 
 def sentences(table: Table, verdict: Verdict) -> list[str]:

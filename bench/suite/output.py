@@ -73,7 +73,7 @@ PUBLISHED = Path(reports.__file__).with_name("published")
 def stand_beside(folder: Path, against: str) -> int:
     """Copy records into a run folder that belong into its tables: the rows a new one is read against.
 
-    ``against`` is ``leaderboard``, a run folder or a folder of records. A method that the run has itself is not copied.
+    ``against`` is ``leaderboard``, a run folder or a folder of records. A row that the run has itself is not copied.
     Returns how many were copied.
 
     Raises
@@ -82,10 +82,10 @@ def stand_beside(folder: Path, against: str) -> int:
     """
     own = load_run(folder)
     tables = {group_key(item.record) for item in own}
-    methods = {(group_key(item.record), item.record.method.name) for item in own}
+    methods = {(group_key(item.record), item.record.method.row_name) for item in own}
     copied = 0
     for record, path in load_run(PUBLISHED if against == "leaderboard" else Path(against)):
-        if group_key(record) not in tables or (group_key(record), record.method.name) in methods:
+        if group_key(record) not in tables or (group_key(record), record.method.row_name) in methods:
             continue
         for source in (samples_path(path), path):
             if source.is_file():

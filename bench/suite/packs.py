@@ -56,7 +56,9 @@ class Packed:
 def pack_name(record: Record) -> str:
     """File name of a record's pack."""
     condition = "" if record.condition == "standard" else f"-{record.condition}"
-    return f"{record.method.name}-{record.protocol_id}{condition}-{record.dataset}-{record.profile}-s{record.seed}.zip"
+    return (
+        f"{record.method.row_name}-{record.protocol_id}{condition}-{record.dataset}-{record.profile}-s{record.seed}.zip"
+    )
 
 
 def pack_run(

@@ -112,7 +112,7 @@ def player_of(
     sample_ids : samples to show; empty for ``N_SAMPLES`` spread over the list.
     """
     rows = [row for row in table.rows if row.row.ok and row.row.ok[0].motions_digest in folders]
-    rows = [row for row in rows if row.row.method.name in names] if names else rows[:MOST_BODIES]
+    rows = [row for row in rows if row.row.method.row_name in names] if names else rows[:MOST_BODIES]
     if not rows:
         return None
     digest = table.facts.get("tasks digest", "")
@@ -138,7 +138,7 @@ def player_of(
         motions = Motions.load(folders[row.row.ok[0].motions_digest])
         if motions.n == len(tasks):
             scores = _scores(row, chosen, len(tasks), better)
-            bodies[row.row.method.name] = _body(row.title, [motions.clip(int(place)) for place in chosen], scores)
+            bodies[row.row.method.row_name] = _body(row.title, [motions.clip(int(place)) for place in chosen], scores)
     return PlayerTable(
         name=stem_of(table.key), title=table.title, fps=min(fps, 30.0), parents=CANONICAL_PARENTS, sides=_sides(),
         hands=(LEFT_HAND, RIGHT_HAND), feet=FOOT_JOINTS, head=HEAD,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from bench.adapters import ADAPTERS
@@ -14,6 +14,7 @@ from reports.aggregate import Estimate, estimate, tie_groups
 from reports.context import judge_summary
 from reports.formatting import number, one_line
 from reports.paper_table import PaperCell, PaperColumn, PaperRow, PaperTable
+from reports.records import PAPER_BUDGET
 from reports.rows import GroupKey, Row, StoredRecord, groups, rows_of
 from reports.tables import build_table
 
@@ -62,15 +63,16 @@ def protocol_of(table_id: str) -> str:
 def _joined(
     table_id: str, published: Sequence[Published], key: GroupKey | None, stored: Sequence[StoredRecord]
 ) -> PaperTable:
-    rows = {row.method.name: row for row in rows_of(stored)}
+    rows = {row.method.row_name: row for row in rows_of(stored)}
     columns = _columns(published) or _measured_columns(key, stored)
     cells_of = {(item.method, item.metric): item for item in published}
     ranks = {column.name: _ranks(column, list(rows.values())) for column in columns}
     printed = list(dict.fromkeys((item.method, item.our_method) for item in published))
+    answering = {method: _most_trained(method, rows.values()) for _, method in printed}
     paper_rows = [
-        _paper_row(name, method, columns, cells_of, rows.get(method), ranks, table_id) for name, method in printed
+        _paper_row(name, method, columns, cells_of, answering[method], ranks, table_id) for name, method in printed
     ]
-    ours = [name for name in rows if name not in {method for _, method in printed}]
+    ours = [name for name, row in rows.items() if row not in answering.values()]
     own_rows = [_own_row(rows[name], columns, ranks) for name in ours if rows[name].ok]
     title = f"{published[0].paper}, {published[0].table}" if published else WITHOUT_PRINTED_NUMBERS[table_id]
     return PaperTable(
@@ -82,6 +84,12 @@ def _joined(
         orders=tuple(order for column in columns if (order := _order(column, ranks[column.name], rows))),
         facts=_facts(stored),
     )
+
+
+def _most_trained(method: str, rows: Iterable[Row]) -> Row | None:
+    """The row that stands beside a paper's: trained as the paper does, where there is such a row."""
+    own = [row for row in rows if row.method.name == method]
+    return max(own, key=lambda row: row.method.budget == PAPER_BUDGET, default=None)
 
 
 def _columns(published: Sequence[Published]) -> tuple[PaperColumn, ...]:
@@ -123,12 +131,14 @@ def _paper_row(
     cells = {}
     for column in columns:
         item = items.get((name, column.name))
-        best = _is_best(method, ranks[column.name])
+        best = row is not None and _is_best(row.method.row_name, ranks[column.name])
         cells[column.name] = (
             PaperCell(gap="the paper has no such cell") if item is None else _cell(item, row, best, table_id)
         )
-    title = row.method.title if row else (ADAPTERS[method].title if method in ADAPTERS else "")
-    return PaperRow(name, method, title, ("copies",) if row and row.copies else (), cells)
+    title = row.method.row_title if row else (ADAPTERS[method].title if method in ADAPTERS else "")
+    return PaperRow(
+        name, row.method.row_name if row else method, title, ("copies",) if row and row.copies else (), cells
+    )
 
 
 def _own_row(row: Row, columns: Sequence[PaperColumn], ranks: dict[str, dict[str, int]]) -> PaperRow:
@@ -136,12 +146,12 @@ def _own_row(row: Row, columns: Sequence[PaperColumn], ranks: dict[str, dict[str
         column.name: PaperCell(
             ours=_estimate(row, column.metric, column.slice) if column.metric else None,
             gap="no such number in this record" if column.metric else NOT_MEASURED,
-            best=_is_best(row.method.name, ranks[column.name]),
+            best=_is_best(row.method.row_name, ranks[column.name]),
         )
         for column in columns
     }
     marks = (*(["anchor"] if row.method.kind == "anchor" else []), *(["copies"] if row.copies else []))
-    return PaperRow("", row.method.name, row.method.title, marks, cells)
+    return PaperRow("", row.method.row_name, row.method.row_title, marks, cells)
 
 
 def _cell(item: Published, row: Row | None, best: bool, table_id: str) -> PaperCell:
@@ -151,7 +161,7 @@ def _cell(item: Published, row: Row | None, best: bool, table_id: str) -> PaperC
     ours = _estimate(row, item.our_metric, item.our_slice) if row is not None and row.ok and item.our_metric else None
     gap = "" if ours is not None else _gap(item, row, table_id)
     comparable, why = item.comparable, item.why
-    if comparable and item.unit == "count" and row is not None and not row.method.trained_on.endswith("budget paper"):
+    if comparable and item.unit == "count" and row is not None and row.method.budget != PAPER_BUDGET:
         comparable, why = False, f"ours is narrower than the paper's network ({row.method.trained_on})"
     return PaperCell(printed, published, ours, gap, comparable, why, best and ours is not None)
 
@@ -202,7 +212,7 @@ def _order(column: PaperColumn, ranks: dict[str, int], rows: dict[str, Row]) -> 
         return ""
     tied: dict[int, list[str]] = {}
     for name, rank in ranks.items():
-        tied.setdefault(rank, []).append(one_line(rows[name].method.title))
+        tied.setdefault(rank, []).append(one_line(rows[name].method.row_title))
     return f"{column.title}, best first, = not separable: " + " > ".join(" = ".join(names) for names in tied.values())
 
 
@@ -254,7 +264,7 @@ def explain(table: PaperTable, cell: str, stored: Sequence[StoredRecord]) -> str
     own = [
         item
         for item in stored
-        if (item.record.method.name, item.record.protocol_label) == (row.method, label)
+        if (item.record.method.row_name, item.record.protocol_label) == (row.method, label)
         and f"{item.record.dataset} · {item.record.profile}" == table.dataset
     ]
     if found.ours is None or not own:

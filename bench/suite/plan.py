@@ -14,13 +14,12 @@ from bench.suite.setting import Setting
 from bench.suite.store import Store
 from bench.suite.truth import KNOWN_FOR
 from bench.suite.workers import Outcome
-from reports.records import MethodFacts, digest_of
+from reports.records import TRAINED_HERE, MethodFacts, digest_of
 
 SECONDS_PER_1000_SAMPLES = {"generate": 6.0, "score": 14.0}
 """Rough cost of a cell on one core, for ``--dry-run``; measured on the anchor rows."""
 BYTES_PER_FRAME = 21 * 16 + 12
 WHOLE_TAKE_FRAMES = 1600
-TRAINED_HERE = "fit part, budget "
 """What a row was trained on that this benchmark trained itself, followed by the budget."""
 
 
@@ -101,11 +100,6 @@ def _facts(source: AdapterSource, adapter: type[Adapter], digest: str, budget: s
         trained_on=trained,
         draws_from=adapter.draws_from,
     )
-
-
-def budget_of(facts: MethodFacts) -> str:
-    """The budget that a row of this benchmark was trained with; ``small``, the default, where nothing was trained."""
-    return facts.trained_on.removeprefix(TRAINED_HERE) if facts.trained_on.startswith(TRAINED_HERE) else "small"
 
 
 def _unsupported(adapter: type[Adapter], setting: Setting) -> str:

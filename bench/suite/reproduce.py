@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Literal
 
 from bench.errors import BadConfig
-from bench.suite.plan import budget_of
 from bench.suite.request import RunRequest
 from bench.suite.run import run
 from bench.suite.session import Progress
-from reports.records import Measurement, Record, read_record
+from reports.records import USUAL_BUDGET, Measurement, Record, read_record
 
 Outcome = Literal["same", "within the interval", "outside", "no interval", "gone", "a duration"]
 WITHIN: tuple[Outcome, ...] = ("same", "within the interval", "a duration")
@@ -57,7 +56,7 @@ def reproduce(
         protocols=(record.protocol_label,),
         profile=record.profile,
         seeds=(record.seed,),
-        budget=budget_of(record.method),
+        budget=record.method.budget or USUAL_BUDGET,
         split=record.split,
         command=command,
     )

@@ -77,7 +77,7 @@ class Opinions:
         answers = np.array_equal(judged.motions.styles, [task.target_style for task in self.setting.tasks])
         numbers = tuple(self._numbers(record, judged))
         return TrustRow(
-            method=record.method.name, title=record.method.title, kind=record.method.kind, seed=record.seed,
+            method=record.method.row_name, title=record.method.row_title, kind=record.method.kind, seed=record.seed,
             motions_digest=record.motions_digest, numbers=numbers,
             splits=tuple(self._splits(stored, judged)) if answers else (),
             sessions=self._sessions(judged, answers) if self.styles_of_session else None,

@@ -30,7 +30,7 @@ from bench.suite.cell import world_of
 from bench.suite.keys import adapter_digest
 from bench.suite.motions import Motions, put_given
 from bench.suite.packs import PACKS_FOLDER, MotionPack, fetch, pack_name, read_pack
-from bench.suite.plan import Cell, budget_of, plan_cells
+from bench.suite.plan import Cell, plan_cells
 from bench.suite.request import RunRequest
 from bench.suite.run import fresh_records_folder
 from bench.suite.session import Progress, session_of
@@ -39,6 +39,7 @@ from bench.suite.setting_run import SettingRun
 from bench.suite.store import Store
 from bench.suite.tolerance import RESCORE_TOLERANCE, same_array, same_number
 from reports.records import (
+    USUAL_BUDGET,
     BadRecord,
     Record,
     digest_of,
@@ -318,7 +319,8 @@ class _Verifier:
             return
         adapter = adapter_class()
         if adapter_class.fits():
-            [cell] = plan_cells(setting, [source], seeds=(record.seed,), budget=budget_of(record.method), device="cpu")
+            budget = record.method.budget or USUAL_BUDGET
+            [cell] = plan_cells(setting, [source], seeds=(record.seed,), budget=budget, device="cpu")
             store = Store(self.request.store)
             if not store.has("fit", cell.fit_key):
                 self._say(

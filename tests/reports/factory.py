@@ -286,7 +286,7 @@ def make_row(
         joint = [_joint_measurement(arrays, tasks, name) for name in SLICES]
         measurements = (*joint, *_further_measurements(fake, joint[0].value or 0.0, tasks))
     record = Record(
-        key=digest_of(["key", fake.name, seed, trial, dataset, profile]), method=facts,
+        key=digest_of(["key", facts.row_name, seed, trial, dataset, profile]), method=facts,
         protocol="stylebench-transfer", protocol_version=1, dataset=dataset, dataset_digest=digest_of(dataset),
         split="default", split_seed=0, track="transfer", profile=profile, seed=seed, trial=trial, status=fake.status,
         reason=fake.reason, log="" if fake.status == "ok" else f"logs/{fake.name}.log",

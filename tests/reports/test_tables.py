@@ -55,6 +55,23 @@ def test_a_row_that_failed_is_shown_with_its_reason(table: Table) -> None:
     assert "no answer within 60 s for task 17" in render(table, "text")
 
 
+def test_a_method_trained_longer_stands_beside_itself(tmp_path: Path) -> None:
+    usual = replace(METHODS[0], joint=30.0)
+    longer = replace(usual, joint=80.0, trained_on="fit part, budget paper")
+    write_run(tmp_path, (*ANCHORS, usual, longer), FakeTasks(n=200, n_clusters=40))
+    [table] = tables_of_run(tmp_path)
+    best, other = table.of("methods")
+    assert (best.row.method.row_name, best.title) == (f"{usual.name}@paper", f"{usual.title} (paper budget)")
+    assert (other.row.method.row_name, other.title) == (usual.name, usual.title)
+    assert (best.rank, other.rank) == (1, 2)
+    assert best.row.method.budget == "paper" and other.row.method.budget == "small"
+
+
+def test_only_a_row_that_was_trained_here_has_a_budget() -> None:
+    record, _ = make_row(FakeMethod("theirs", "Theirs", trained_on="their data, budget paper"), FakeTasks())
+    assert record.method.budget == "" and record.method.row_name == "theirs"
+
+
 def test_estimate_of_one_seed_is_the_measurement_and_of_two_their_mean(tmp_path: Path) -> None:
     write_run(tmp_path, METHODS[:1], FakeTasks(n=200, n_clusters=40), seeds=(0, 1))
     [row] = rows_of(load_run(tmp_path))

@@ -78,9 +78,14 @@ def test_an_unknown_table_names_the_known_ones() -> None:
 
 
 def stored_table(folder: Path, shares: dict[str, float]) -> PaperTable:
-    """Park's Table 2 from made-up records of its protocol, in which CRA is what the factory makes."""
-    for name, share in shares.items():
-        record, arrays = make_row(FakeMethod(name, name, joint=share), FakeTasks())
+    """Park's Table 2 from made-up records of its protocol, in which CRA is what the factory makes.
+
+    Names of ``shares`` are those of rows: ``park2021``, or ``park2021@paper`` for another budget.
+    """
+    for row_name, share in shares.items():
+        name, _, budget = row_name.partition("@")
+        trained_on = f"fit part, budget {budget or 'small'}"
+        record, arrays = make_row(FakeMethod(name, name, joint=share, trained_on=trained_on), FakeTasks())
         joint = record.find("joint_recognition")
         assert joint is not None
         renamed = {key.replace("joint_recognition", "cra"): values for key, values in arrays.items()}
@@ -105,6 +110,14 @@ def test_numbers_stand_beside_each_other_and_only_a_separable_one_is_best(tmp_pa
     assert "published: 60.86 ± 2.06 %" in text and "again: stylebench reproduce" in text and "judge " in text
     with pytest.raises(BadConfig, match="ROW:QUANTITY"):
         explain(table, "park2021:FID", ())
+
+
+def test_a_paper_stands_beside_the_row_that_was_trained_as_it_says(tmp_path: Path) -> None:
+    table = stored_table(tmp_path, {"park2021": 30.0, "park2021@paper": 60.0, "aberman2020": 30.0})
+    rows = {row.method: row for row in table.rows}
+    assert rows["park2021@paper"].printed and not rows["park2021"].printed
+    assert rows["park2021@paper"].cells["CRA"].best
+    assert "budget paper" in explain(table, "park2021@paper:CRA", load_run(tmp_path))
 
 
 def test_an_unmeasured_table_explains_itself() -> None:
