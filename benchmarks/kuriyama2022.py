@@ -70,11 +70,12 @@ def print_matches(network: GestureTransfer, sequences: Sequence[Take]) -> None:
             pair = "one scenario, two styles" if content.content == style.content else "two scenarios"
         chosen = network.transformer.similarity(asking, answering).argmax(dim=-1)[0]
         places_apart[pair].append((chosen - torch.arange(len(chosen))).abs())
-    print(f"positions {network.config.positions}, losses {', '.join(network.config.losses)}: most similar style token")
+    codes = "with" if network.config.positions else "without"
+    print(f"{codes} position codes, losses {', '.join(network.config.losses)}: the most similar style token stands")
     for pair, found in places_apart.items():
         apart = torch.cat(found)
         own, near = (100.0 * float((apart <= reach).float().mean()) for reach in (0, 2))
-        print(f"  {pair:26s} at the same place {own:5.1f} %, within two of it {near:5.1f} %")
+        print(f"  {pair:26s} at the same place in {own:5.1f} %, within two of it in {near:5.1f} %")
 
 
 @torch.inference_mode()
@@ -106,7 +107,7 @@ def _median_s(call: Callable[[], object]) -> float:
 
 def _print_time(what: str, threads: int, seconds: float, n_poses: int) -> None:
     per_pose_us = 1e6 * seconds / n_poses
-    print(f"{what}, {threads} threads: {per_pose_us:.1f} us a pose (paper: {PAPER_US:g} us)")
+    print(f"{what}, threads {threads}: {per_pose_us:.1f} us a pose (paper: {PAPER_US:g} us)")
 
 
 if __name__ == "__main__":
