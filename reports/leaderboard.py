@@ -62,8 +62,8 @@ def _first_screen(tables: Sequence[tuple[Table, Verdict]]) -> str:
             [
                 escape_markdown(_short_title(table)),
                 "; ".join(f"{escape_markdown(row.title)} {_primary(table, row)}" for row in verdict.leaders),
-                _titles(verdict.transfers),
-                _titles([*verdict.like_a_trick, *verdict.does_nothing]),
+                "–" if verdict.no_floor else _titles(verdict.transfers),
+                "–" if verdict.no_floor else _titles([*verdict.like_a_trick, *verdict.does_nothing]),
                 _titles(copying) if copying else "",
                 _costs(verdict.leaders[0]),
             ]
@@ -146,7 +146,7 @@ def _cost(table: Table) -> str:
     """What each method took to train, run and score; empty without methods."""
     rows = [row for row in table.rows if row.row.method.kind == "method"]
     column = table.primary
-    headers = ["rank", "method", column.header if column else "", "parameters", "run", "memory", "needs", "trained on"]
+    headers = ["rank", "method", column.header if column else "", "seeds", "run", "memory", "needs", "trained on"]
     return _pipe(headers, [_cost_line(row, column) for row in rows])
 
 
@@ -160,8 +160,8 @@ def _cost_line(row: TableRow, column: Column | None) -> list[str]:
         UNDEFINED if row.rank is None else str(row.rank),
         escape_markdown(row.title) + (" (copies)" if row.row.copies else ""),
         row.row.status if row.section == "unfinished" else value,
-        UNDEFINED if facts.parameters is None else count(facts.parameters),
-        duration(sum(item.wall_s for item in provenance)),
+        str(len(row.row.seeds)) if facts.trained_on else UNDEFINED,
+        duration(sum(item.wall_s for item in provenance) / len(provenance)),
         f"{max(item.peak_rss_mb for item in provenance) / 1000.0:.1f} GB",
         ", ".join(words.removeprefix("needs ") for words in needs),
         escape_markdown(facts.trained_on),
@@ -213,5 +213,8 @@ def _runs(stored: Sequence[StoredRecord]) -> list[str]:
         days = sorted({record.provenance.time_utc[:10] for record in records})
         span = days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
         cells = f"{len(records)} cell{'s' if len(records) != 1 else ''}"
-        items.append(f"`{command}`<br>commit {commit}; {escape_markdown(machine)}; {cells} in {wall}; {span}")
+        keys = " ".join(f"`{key}`" for key in sorted(record.key for record in records))
+        items.append(
+            f"`{command}`<br>commit {commit}; {escape_markdown(machine)}; {cells} in {wall}; {span}; keys {keys}"
+        )
     return items

@@ -23,7 +23,7 @@ Status = Literal["ok", "failed", "timeout", "oom", "invalid", "unsupported", "sk
 Better = Literal["higher", "lower", "one", "none"]
 
 TRAINED_HERE = "fit part, budget "
-"""How ``trained_on`` starts where this benchmark trained the row; the budget follows, and a comma where more is said."""
+"""How ``trained_on`` starts where this benchmark trained the row; the budget follows, and a comma before more."""
 USUAL_BUDGET, PAPER_BUDGET = "small", "paper"
 
 

@@ -47,6 +47,11 @@ class Row:
         return tuple(record for record, _ in self.stored if record.status == "ok")
 
     @property
+    def seeds(self) -> tuple[int, ...]:
+        """Seeds of the records that carry numbers, each once."""
+        return tuple(sorted({record.seed for record in self.ok}))
+
+    @property
     def status(self) -> str:
         """``ok`` if any record is, else the status of the first."""
         return "ok" if self.ok else self.stored[0].record.status

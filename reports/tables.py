@@ -179,6 +179,8 @@ def _marks(row: Row) -> tuple[str, ...]:
         "needs content label": facts.needs_content_label,
     }
     chosen = [name for name, holds in marks.items() if holds]
+    if len(row.seeds) > 1:
+        chosen.append(f"{len(row.seeds)} seeds")
     if row.status != "ok":
         chosen.insert(0, row.status)
     elif row.reason:

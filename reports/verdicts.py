@@ -10,10 +10,15 @@ from reports.formatting import escape_markdown, number
 from reports.significance import SIGNIFICANCE, holm
 from reports.tables import Column, Table, TableRow
 
-CEILING_ROWS = ("real-test", "real-disjoint", "label-oracle", "procedural-truth")
-"""Anchors made of true answers; also with a suffix: ``real-test+park-ik``."""
-NOTHING_ROWS = ("copy-content", "copy-style", "coin-flip", "mean-pose", "frozen-frame", "noise")
+CEILING_ROWS = (
+    "real-test", "real-disjoint", "label-oracle", "procedural-truth", "gesture-truth", "real-answer", "take-to-take",
+    "gesture-imitation",
+)  # fmt: skip
+"""Anchors made of performed or true answers; also with a suffix: ``real-test+park-ik``."""
+NOTHING_ROWS = ("copy-content", "copy-style", "coin-flip", "mean-pose", "frozen-frame", "repeat-last", "noise")
 """Anchors that do not even try; also with a suffix: ``noise-0.1``."""
+RIGHT = 1e-9
+"""An error below this is none: what has it cannot be beaten."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,8 @@ class Verdict:
     """ranked methods separably better than every row that does nothing, but not than the trick"""
     does_nothing: tuple[TableRow, ...]
     """the other ranked methods"""
+    no_floor: str
+    """why nothing can be said of the three above, which then are empty; empty where it can"""
     trick: TableRow | None
     """the best anchor that neither is real motion nor does nothing nor copies"""
     copying_methods: tuple[TableRow, ...]
@@ -42,46 +49,89 @@ def is_one_of(name: str, families: Sequence[str]) -> bool:
 def verdict_of(table: Table) -> Verdict:
     """Judge the ranked methods of a table on its primary column.
 
-    Differences are paired and Holm-corrected over all comparisons of one kind. Without replicates of both rows a
+    A method is better than nothing if it is above chance, where the column has one, and separably better than every
+    do-nothing row that has a number: of its paired differences the largest p, Holm-corrected over the methods, decides
+    (an intersection-union test: only a method that beats them all is called better). Without replicates of both rows a
     method counts as not separable.
     """
     ranked = [row for row in table.of("methods") if row.rank is not None]
     anchors = [row for row in table.of("anchors") if row.row.method.kind == "anchor"]
-    nothing = [row for row in anchors if is_one_of(row.row.method.name, NOTHING_ROWS)]
+    measured = [row for row in anchors if _primary_value(table.primary, row) is not None]
+    nothing = [row for row in measured if is_one_of(row.row.method.name, NOTHING_ROWS)]
     tricks = [
         row
-        for row in anchors
+        for row in measured
         if not row.row.copies and not is_one_of(row.row.method.name, (*NOTHING_ROWS, *CEILING_ROWS))
     ]
-    above_nothing = _better_than_all(table.primary, ranked, nothing)
-    above_trick = _better_than_all(table.primary, ranked, tricks[:1])
+    true = [row for row in measured if is_one_of(row.row.method.name, CEILING_ROWS)]
+    no_floor = _why_no_floor(table.primary, nothing, true)
+    judged = [] if no_floor else ranked
+    above_nothing = _above_chance(table.primary, _better_than_all(table.primary, judged, nothing))
+    above_trick = _better_than_all(table.primary, above_nothing, tricks[:1])
     return Verdict(
         leaders=tuple(row for row in ranked if row.rank == 1),
-        transfers=tuple(row for row in above_nothing if row in above_trick),
+        transfers=above_trick,
         like_a_trick=tuple(row for row in above_nothing if row not in above_trick),
-        does_nothing=tuple(row for row in ranked if row not in above_nothing),
+        does_nothing=tuple(row for row in judged if row not in above_nothing),
+        no_floor=no_floor,
         trick=tricks[0] if tricks else None,
         copying_methods=tuple(row for row in table.of("anchors") if row.row.method.kind == "method"),
         copying_anchors=tuple(row for row in anchors if row.row.copies),
     )
 
 
+def _primary_value(column: Column | None, row: TableRow) -> float | None:
+    found = row.estimates.get(column.key) if column else None
+    return found.value if found else None
+
+
+def _why_no_floor(column: Column | None, nothing: Sequence[TableRow], true: Sequence[TableRow]) -> str:
+    """Why *better than nothing* has no meaning in a table; empty where it has one. Rows best first."""
+    if column is None or not nothing:
+        return "no row that does nothing has a number here"
+    right = [row for row in nothing if column.better == "lower" and (_primary_value(column, row) or 0.0) < RIGHT]
+    if right:
+        return f"doing nothing is a right answer here ({escape_markdown(right[0].title)} {_value(column, right[0])})"
+    if true and _badness(column, true[0]) >= _badness(column, nothing[0]):
+        best = " against ".join(f"{escape_markdown(row.title)} {_value(column, row)}" for row in (true[0], nothing[0]))
+        return f"the column puts doing nothing before true answers ({best})"
+    return ""
+
+
+def _badness(column: Column, row: TableRow) -> float:
+    return badness(row.row, column.metric, column.slice)
+
+
+def _above_chance(column: Column | None, rows: Sequence[TableRow]) -> tuple[TableRow, ...]:
+    """Rows whose interval lies above what guessing gives; all of them where guessing gives nothing."""
+    return tuple(row for row in rows if column is None or _lowest(column, row) >= _chance(column, row))
+
+
+def _lowest(column: Column, row: TableRow) -> float:
+    found = row.estimates[column.key]
+    return float("inf") if found.low is None else found.low
+
+
+def _chance(column: Column, row: TableRow) -> float:
+    measured = row.row.measurements(column.metric, column.slice)
+    return max((item.details["chance"] for item in measured if "chance" in item.details), default=-float("inf"))
+
+
 def _better_than_all(
     column: Column | None, rows: Sequence[TableRow], rivals: Sequence[TableRow]
 ) -> tuple[TableRow, ...]:
-    """Rows separably better than each rival, after Holm's correction over all rows x rivals."""
+    """Rows separably better than each rival, after Holm's correction over the rows."""
     if column is None or not rows:
         return ()
+    adjusted = holm([max((_p_of_better(column, row, rival) for rival in rivals), default=0.0) for row in rows])
+    return tuple(row for row, p in zip(rows, adjusted, strict=True) if p < SIGNIFICANCE)
+
+
+def _p_of_better(column: Column, row: TableRow, rival: TableRow) -> float:
+    """p of the paired difference; 1 where it goes the other way or cannot be tested."""
+    found = paired_difference(row.row, rival.row, column.metric, column.slice)
     sign = -1.0 if column.better == "lower" else 1.0
-    pairs = [(row, rival) for row in rows for rival in rivals]
-    found = [paired_difference(row.row, rival.row, column.metric, column.slice) for row, rival in pairs]
-    adjusted = holm([1.0 if difference is None else difference.p for difference in found])
-    beaten = {
-        (row.row.method.row_name, rival.row.method.row_name)
-        for (row, rival), difference, p in zip(pairs, found, adjusted, strict=True)
-        if difference is not None and p < SIGNIFICANCE and sign * difference.value > 0.0
-    }
-    return tuple(row for row in rows if all((row.row.method.row_name, r.row.method.row_name) in beaten for r in rivals))
+    return 1.0 if found is None or sign * found.value <= 0.0 else found.p
 
 
 def sentences(table: Table, verdict: Verdict) -> list[str]:
@@ -90,6 +140,8 @@ def sentences(table: Table, verdict: Verdict) -> list[str]:
     if column is None:
         return ["No row of this table has finished."]
     said = [_leading(table, column, verdict)]
+    if verdict.leaders and verdict.no_floor:
+        said.append(f"**Better than nothing?** Not to be said from this table: {verdict.no_floor}.")
     if verdict.transfers:
         done = "Really transfer style" if column.metric == "joint_recognition" else "Really better"
         said.append(f"**{done}** ({_beaten(verdict)}): {_names(verdict.transfers)}.")
@@ -111,7 +163,9 @@ def _beaten(verdict: Verdict) -> str:
 
 def _leading(table: Table, column: Column, verdict: Verdict) -> str:
     if not verdict.leaders:
-        return "No method is ranked in this table yet; its anchor rows show what the numbers mean."
+        if table.of("methods"):
+            return f"Methods stand in order of {column.title} and carry no ranks: their differences cannot be tested."
+        return "No method is in this table yet; its anchor rows show what the numbers mean."
     tie = " (a tie: not separable on these samples)" if len(verdict.leaders) > 1 else ""
     values = ", ".join(f"{escape_markdown(row.title)} {_value(column, row)}" for row in verdict.leaders)
     return f"**Leads** on {column.title}{tie}: {values}."

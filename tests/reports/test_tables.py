@@ -67,6 +67,16 @@ def test_a_method_trained_longer_stands_beside_itself(tmp_path: Path) -> None:
     assert best.row.method.budget == "paper" and other.row.method.budget == "small"
 
 
+def test_a_row_says_how_many_seeds_it_is_the_mean_of(tmp_path: Path) -> None:
+    write_run(tmp_path, METHODS[:1], FakeTasks(n=60, n_clusters=12), seeds=(0, 1))
+    [table] = tables_of_run(tmp_path)
+    assert "2 seeds" in table.rows[0].marks
+    page = render_leaderboard(tmp_path)
+    assert re.search(r"\| method +\| joint recognition, % ↑ +\| seeds +\|", page)
+    assert re.search(r"\| 1 +\| Park 2021 +\| [0-9.]+ +\| 2 +\|", page)
+    assert all(record.key in page for record, _ in load_run(tmp_path))
+
+
 def test_only_a_row_that_was_trained_here_has_a_budget() -> None:
     record, _ = make_row(FakeMethod("theirs", "Theirs", trained_on="their data, budget paper"), FakeTasks())
     assert record.method.budget == "" and record.method.row_name == "theirs"

@@ -9,7 +9,7 @@ from reports.records import BadRecord, samples_path
 from reports.render import render, text_frame
 from reports.rows import load_run
 from reports.tables import Table, TableRow, tables_of_run
-from reports.verdicts import is_one_of, sentences, verdict_of
+from reports.verdicts import Verdict, is_one_of, sentences, verdict_of
 from tests.reports.factory import ANCHORS, METHODS, FakeMethod, FakeTasks, make_row, write_row, write_run
 
 TASKS = FakeTasks(n=400, n_clusters=80)
@@ -49,9 +49,60 @@ def test_sentences_name_leaders_copiers_and_the_scale(table: Table) -> None:
     assert "real data (" in said and "the best simple trick (style mean-shift)" in said
 
 
+def verdict_with(folder: Path, *fakes: FakeMethod, primary: str = "") -> tuple[Table, Verdict]:
+    """The verdict on a made-up table, with another column first where one is named."""
+    [found] = tables_of_run(write_run(folder, fakes, TASKS))
+    if primary:
+        first = next(column for column in found.columns if column.metric == primary)
+        found = replace(found, columns=(first, *found.columns))
+    return found, verdict_of(found)
+
+
+def test_without_a_row_that_does_nothing_nothing_is_called_better(tmp_path: Path) -> None:
+    found, verdict = verdict_with(tmp_path, *ANCHORS[:3], METHODS[0])
+    assert not (verdict.transfers or verdict.like_a_trick or verdict.does_nothing)
+    assert names(verdict.leaders) == {"park2021"}
+    said = "\n".join(sentences(found, verdict))
+    assert "Not to be said from this table: no row that does nothing has a number here" in said
+
+
+def test_where_doing_nothing_is_right_no_method_is_blamed(tmp_path: Path) -> None:
+    copy_content = replace(ANCHORS[3], conditional_kid=0.0)
+    assert copy_content.name == "copy-content"
+    _, verdict = verdict_with(tmp_path, ANCHORS[1], copy_content, METHODS[0], primary="conditional_kid")
+    assert not (verdict.transfers or verdict.like_a_trick or verdict.does_nothing)
+    assert "doing nothing is a right answer here (copy content 0.00" in verdict.no_floor
+
+
+def test_a_column_that_puts_copies_before_true_answers_says_nothing(tmp_path: Path) -> None:
+    flattered = replace(ANCHORS[3], conditional_kid=0.005)
+    _, verdict = verdict_with(tmp_path, ANCHORS[1], flattered, METHODS[0], primary="conditional_kid")
+    assert verdict.no_floor.startswith("the column puts doing nothing before true answers (real disjoint 0.0")
+
+
+def test_a_method_below_chance_is_not_better_than_nothing(tmp_path: Path) -> None:
+    poor, fair = FakeMethod("poor", "Poor", joint=1.5), FakeMethod("fair", "Fair", joint=20.0)
+    hopeless = FakeMethod("copy-content", "copy content", "anchor", joint=0.0)
+    _, verdict = verdict_with(tmp_path, ANCHORS[1], hopeless, poor, fair)
+    assert names(verdict.transfers) == {"fair"} and names(verdict.does_nothing) == {"poor"}
+
+
+def test_many_do_nothing_rows_do_not_make_a_clear_difference_unclear(tmp_path: Path) -> None:
+    """One method against twenty rows that do nothing: beating all of them is one claim, not twenty."""
+    idle = [replace(ANCHORS[3], name=f"noise-{place}", title=f"noise {place}") for place in range(20)]
+    _, verdict = verdict_with(tmp_path, ANCHORS[1], *idle, FakeMethod("fair", "Fair", joint=12.0))
+    assert names(verdict.transfers) == {"fair"}
+
+
+def test_methods_that_cannot_be_ranked_are_not_said_to_be_missing(table: Table) -> None:
+    unranked = replace(table, rows=tuple(replace(row, rank=None) for row in table.rows))
+    [first, *_] = sentences(unranked, verdict_of(unranked))
+    assert first.startswith("Methods stand in order of joint recognition and carry no ranks")
+
+
 def test_a_table_of_anchors_only_says_so(tmp_path: Path) -> None:
     [found] = tables_of_run(write_run(tmp_path, ANCHORS, FakeTasks(n=60, n_clusters=12)))
-    assert sentences(found, verdict_of(found))[0].startswith("No method is ranked in this table yet")
+    assert sentences(found, verdict_of(found))[0].startswith("No method is in this table yet")
 
 
 def test_a_table_without_any_number_still_prints(tmp_path: Path) -> None:
