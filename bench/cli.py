@@ -89,7 +89,7 @@ def run(
     fps: FpsOption = None,
     against: Annotated[str, typer.Option(help="Rows to stand beside: leaderboard, or a run folder.")] = "",
     retrain_judges: Annotated[bool, typer.Option(help="Train judges here; do not use the committed ones.")] = False,
-    dry_run: Annotated[bool, typer.Option(help="Print cells, minutes and disk; run nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option(help="Print cells, minutes and disk; run no cell.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print results as JSON.")] = False,
 ) -> None:
     """Run methods on datasets and print the table.

@@ -67,12 +67,12 @@ class Puzzle(LearnedAdapter["PuzzleConfig", "MotionPuzzle"]):
 
 
 class PuzzleReleased(Puzzle):
-    """What the released code does: 12 channels, pooling that shares joints, no root loss."""
+    """What the released code does: 12 channels, pooling that shares joints, no root loss, no temporal cropping."""
 
     name = "motion-puzzle-released"
     title = "Motion Puzzle 2022, as released"
     description = "Motion Puzzle as its released code has it: no root features, shared pooling, other weights"
-    variant: ClassVar[Mapping[str, Any]] = {"faithful_to_code": True, "betas": (0.9, 0.999)}
+    variant: ClassVar[Mapping[str, Any]] = {"faithful_to_code": True, "betas": (0.9, 0.999), "cropping": 0.0}
 
 
 class PuzzleWithoutAttention(Puzzle):

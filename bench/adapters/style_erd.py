@@ -11,6 +11,7 @@ from bench.adapters.base import Stream, Traits
 from bench.adapters.learned import LearnedAdapter
 from bench.datasets.take import Take
 from bench.motion.clip import Clip
+from bench.motion.skeleton import N_JOINTS
 
 if TYPE_CHECKING:
     from bench.methods.style_erd.style_erd import StyleErdConfig, StyleErdNetwork
@@ -63,13 +64,17 @@ class StyleErd(LearnedAdapter["StyleErdConfig", "StyleErdNetwork"]):
 
 
 class StyleErdReleased(StyleErd):
-    """What the released code does: 4 neutral and 6 style layers, a small rotation loss, a decoder without labels."""
+    """What the released code does: 4 neutral and 6 style layers, a decoder without labels, other weights of losses.
+
+    The code's rotation loss is summed over the 24 frames and the joints of a window, with weight 0.05.
+    """
 
     name = "style_erd-released"
     title = "Style-ERD 2022, as released"
     description = "Style-ERD as its released code has it: 4 neutral and 6 style layers, decoder without labels"
     variant: ClassVar[Mapping[str, Any]] = {
-        "neutral_layers": 4, "style_layers": 6, "rotation": 0.05, "decoder_labels": False,
+        "neutral_layers": 4, "style_layers": 6, "rotation": 0.05 * 24 * N_JOINTS, "decoder_labels": False,
+        "penalty_of_mean": True,
     }  # fmt: skip
 
 

@@ -12,8 +12,9 @@ from bench.methods.holden2016.constraints import bone_lengths, constraints, foot
 from bench.methods.holden2016.network import MotionAutoencoder, reconstruction_loss, sparsity_loss
 from bench.methods.layers import gram, n_parameters
 from bench.methods.training import FitRequest
+from bench.methods.windows import FPS
 from bench.motion.clip import Clip
-from bench.motion.edit import crop
+from bench.motion.edit import crop, resample
 from bench.motion.holden_features import UNITS_PER_STATURE, holden_features
 from tests.motion.factory import random_clip
 
@@ -198,6 +199,18 @@ def test_training_is_deterministic_and_lowers_the_loss() -> None:
     assert not torch.equal(network.encoder.weight, other.encoder.weight)
     losses = curves.values[:, curves.names.index("reconstruction")]
     assert losses[-5:].mean() < losses[:5].mean()
+
+
+def test_motion_of_another_frame_rate_is_answered_at_the_trainings() -> None:
+    """The network was trained at 30 fps: what it says of a motion does not depend on how finely that was sampled."""
+    slow, style = crop(random_clip(70, seed=1), 0, 41), random_clip(19, seed=2)
+    assert slow.fps == FPS
+    fast, fast_style = resample(slow, 60.0), resample(style, 60.0)
+    network = fitted()
+    answer = holden.transfer(network, TINY, fast, fast_style, np.random.default_rng(0))
+    expected = holden.transfer(network, TINY, slow, style, np.random.default_rng(0))
+    assert answer.fps == 60.0 and answer.n_frames == fast.n_frames
+    np.testing.assert_allclose(answer.root_xyz_m[::2], expected.root_xyz_m, atol=1e-3)
 
 
 @pytest.mark.parametrize("n_frames", [1, 2, 7, 64])

@@ -58,7 +58,8 @@ class AbermanConfig:
     n_frames, stride : of the training windows.
     transfer_share : of a loss that applies to transferred and to rebuilt motion alike, the transferred one's share.
     penalty_of_mean : as the released code: the gradient penalty is taken of the mean score of a batch, which divides
-        it by the square of the number of scores.
+        it by the square of the batch.
+    scaled_output : not in the paper: the decoder's output is in deviations from the mean rotation of the fit part.
     """
 
     width: float = 1.0

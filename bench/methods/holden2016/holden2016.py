@@ -21,8 +21,9 @@ from bench.methods.holden2016.constraints import constraints, path_velocities
 from bench.methods.holden2016.network import MotionAutoencoder, reconstruction_loss, sparsity_loss
 from bench.methods.layers import gram, held_to
 from bench.methods.training import Curves, FitRequest, Losses, Stateful, Trainable, seeded, train
-from bench.methods.windows import Windows, cut_windows, to_tensor
+from bench.methods.windows import FPS, Windows, at_training_rate, cut_windows, to_tensor
 from bench.motion.clip import Clip
+from bench.motion.edit import resample
 from bench.motion.holden_features import (
     HOLDEN_SLICES,
     UNITS_PER_STATURE,
@@ -135,11 +136,22 @@ def train_holden(config: Holden2016Config, request: FitRequest) -> tuple[Holden2
 def transfer(
     network: MotionAutoencoder, config: Holden2016Config, content: Clip, style: Clip, rng: np.random.Generator
 ) -> Clip:
-    """The content in the style: content and Gram matrix, then the path's speed, then the constraints."""
+    """The content in the style, on the content's bones and clock; the network sees both at its training's rate."""
+    style_hidden = network.encode(_standardised(network, holden_features(resample(style, FPS))[0]))
+    return at_training_rate(content, lambda clip: _transferred(network, config, clip, style_hidden, rng))
+
+
+def _transferred(
+    network: MotionAutoencoder,
+    config: Holden2016Config,
+    content: Clip,
+    style_hidden: Tensor,
+    rng: np.random.Generator,
+) -> Clip:
+    """Content and Gram matrix, then the path's speed, then the constraints; ``style_hidden`` ``[1, width, T' / 2]``."""
     features, start = holden_features(content)
     motion = _standardised(network, features)
     hidden = network.encode(motion)  # [1, width, T / 2]
-    style_hidden = network.encode(_standardised(network, holden_features(style)[0]))
     style_gram = gram(style_hidden) * (hidden.shape[2] / style_hidden.shape[2])
     bound = (6.0 / (motion.shape[1] + motion.shape[2])) ** 0.5
     noise = torch.from_numpy(rng.uniform(-bound, bound, motion.shape).astype(np.float32))

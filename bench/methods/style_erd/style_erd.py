@@ -47,6 +47,8 @@ class StyleErdConfig:
     decoder_labels : off in the released code.
     rotation, position, velocity : weights within the reconstruction loss (eq. 3).
     adversarial, perceptual, penalty : weights of losses; 0 leaves a loss out.
+    penalty_of_mean : as the released code: the gradient penalty is taken of the mean score of a batch, which divides
+        it by the square of the batch.
     agreement : not in the paper: weight of the difference between decoded velocities and those of the positions.
     withheld : share of sources whose style label the encoder does not get in training: a stream has none.
     neutral_share : of the sources; every other one is transferred to neutral.
@@ -75,6 +77,7 @@ class StyleErdConfig:
     adversarial: float = 1.0
     perceptual: float = 0.1
     penalty: float = 128.0
+    penalty_of_mean: bool = False
     agreement: float = 0.0
     classifier_steps: int = 4000
     withheld: float = 0.5
@@ -327,6 +330,8 @@ class StyleErdTraining(Trainable):
         real_scores = self.discriminator(real, wanted, self.content_codes[self.windows.contents[real_rows]])
         fake_scores = self.discriminator(made[..., CRITIC_INPUT], wanted, content)
         critic, penalty = equations.critic(real_scores, fake_scores), gradient_penalty(real_scores, real)
+        if self.config.penalty_of_mean:
+            penalty = penalty / len(real_scores) ** 2
         self.discriminator_optimiser.zero_grad(set_to_none=True)
         (critic + self.config.penalty * penalty).backward()  # type: ignore[no-untyped-call]
         self.discriminator_optimiser.step()
