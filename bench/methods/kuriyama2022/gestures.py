@@ -1,9 +1,9 @@
 """What the paper's networks read and write: logarithmic maps of joint rotations, and the root that follows from a foot.
 
 Kuriyama 2022, section 3.1: 21 joints, three numbers each; 13 joints of the upper half (root, torso, head, two arms) are
-read, 8 joints of the legs are predicted from them. The heading is taken out and copied from the content: that of hips and
-shoulders, where the paper takes the root's own turn about the vertical axis. The root's position is never seen by a
-network.
+read, 8 joints of the legs are predicted from them. The heading is taken out and copied from the content: that of hips
+and shoulders, where the paper takes the root's own turn about the vertical axis. The root's position is never seen by
+a network.
 """
 
 from __future__ import annotations
