@@ -147,6 +147,7 @@ def fit(
         list[str] | None, typer.Option(help="Dataset as NAME or NAME=PATH; repeat for several. Default: procedural.")
     ] = None,
     adapter: Annotated[list[str] | None, typer.Option(help="Your adapter, FILE.py or FILE.py:Class.")] = None,
+    track: Annotated[str, typer.Option(help="Whose training motions: transfer, gesture, prediction, ...")] = "transfer",
     budget: Annotated[str, typer.Option(help="smoke, small or paper.")] = "small",
     seeds: Annotated[str, typer.Option("--seeds", "--seed", help="Comma-separated; one training with each.")] = "0",
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
@@ -164,7 +165,7 @@ def fit(
 
     order = FitOrder(
         data=datasets_of(data or ["procedural"]), methods=names_of(methods), adapter_files=tuple(adapter or ()),
-        budget=budget, seeds=seeds_of(seeds), device=device, split=split, jobs=jobs, out=out, store=store,
+        track=track, budget=budget, seeds=seeds_of(seeds), device=device, split=split, jobs=jobs, out=out, store=store,
         command=command_line(sys.argv[1:]),
     )  # fmt: skip
     with console.ProgressDisplay() as progress:

@@ -37,6 +37,7 @@ class FitOrder:
     ----------
     data : dataset name -> path (None for generated data).
     methods, adapter_files : as for a run; only what learns is trained.
+    track : whose training motions; gestures and prediction have their own, all other tracks those of ``transfer``.
     seeds : one training of each method with each.
     device : ``cpu`` or ``cuda``; weights of one are not those of the other.
     out : folder for figures and logs.
@@ -47,6 +48,7 @@ class FitOrder:
     out: Path
     store: Path
     adapter_files: tuple[str, ...] = ()
+    track: str = "transfer"
     budget: str = "small"
     seeds: tuple[int, ...] = (0,)
     device: str = "cpu"
@@ -95,7 +97,7 @@ def fit_all(order: FitOrder, progress: Progress) -> list[Fitted]:
     with session_of(request, progress) as session:
         for name, path in order.data.items():
             dataset = load_dataset(name, path, lambda what, done, total: progress("data", what, done, total))
-            setting = prepare(dataset, OWN_PROTOCOLS["transfer"], "smoke", session.store, split_kind=order.split)
+            setting = prepare(dataset, OWN_PROTOCOLS[order.track], "smoke", session.store, split_kind=order.split)
             cells = _trained_cells(setting, sources, order)
             found += _fit_cells(session, setting, cells, order)
             _draw(session.store, setting, cells, order)
@@ -104,6 +106,8 @@ def fit_all(order: FitOrder, progress: Progress) -> list[Fitted]:
 
 def _check(order: FitOrder) -> None:
     checked_device(order.device)
+    if order.track not in OWN_PROTOCOLS:
+        raise BadConfig(f"unknown track {order.track!r}", where="--track", remedy=f"one of {', '.join(OWN_PROTOCOLS)}")
     if not order.methods and not order.adapter_files:
         raise BadConfig("no method named", where="--methods", remedy="stylebench list methods shows what there is")
 
@@ -189,8 +193,8 @@ def _draw(store: Store, setting: Setting, cells: Sequence[Cell], order: FitOrder
             found for cell in own if (found := read_curves(store.folder("fit", cell.fit_key), f"seed {cell.seed}"))
         ]
         if curves:
-            title = f"{name}, budget {order.budget}, {setting.dataset.dataset_id}"
-            save_losses(order.out / f"{name}-{order.budget}-{setting.dataset.name}.png", title, curves)
+            title = f"{name}, budget {order.budget}, {order.track}, {setting.dataset.dataset_id}"
+            save_losses(order.out / f"{name}-{order.budget}-{order.track}-{setting.dataset.name}.png", title, curves)
 
 
 def table_of(found: Sequence[Fitted]) -> tuple[list[str], list[list[str]]]:
