@@ -41,7 +41,9 @@ def movie(
     names, samples = names_of(rows), names_of(sample)
     player = _player(run_folder, store, table, names, samples)
     if len(player.samples) < len(samples):
-        raise BadConfig(f"no sample {sample!r}", where="--sample", remedy="sample ids look like s0003")
+        there = ", ".join(sample_id for sample_id, _ in _player(run_folder, store, table, names, ()).samples)
+        missing = sorted(set(samples) - {sample_id for sample_id, _ in player.samples})
+        raise BadConfig(f"no sample {', '.join(missing)}", where="--sample", remedy=f"for example {there}")
     bodies = ["content", "style", *(["truth"] if "truth" in player.bodies else []), *names]
     if out.suffix.lower() in SHEET_FORMS:
         write_sheet(player, range(len(samples)), bodies, out)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from reports.figures import plain_log, styled
@@ -68,6 +69,7 @@ def loss_figure(title: str, trainings: Sequence[TrainingCurves]) -> Figure:
                 plain_log(panel.yaxis)
             panel.set_title(name, fontsize=9.0)
             panel.tick_params(labelsize=7.0)
+            panel.xaxis.set_major_locator(MaxNLocator(4))
         for panel in panels[len(names) :]:
             panel.set_visible(False)
         for panel in panels[max(len(names) - n_columns, 0) : len(names)]:
