@@ -24,6 +24,7 @@ Listener = Callable[[str, str, int, int], None]
 
 POLL_S = 0.25
 GARBLED = "the method wrote into the line between worker and harness"
+TRAIN_FIRST = ", in training; `stylebench fit` takes as long as it takes and goes on where this stopped"
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ class _Watch:
         self.listener = listener
         self.current = job.cells[0].key
         self.since = time.monotonic()
+        self.training = False
         self.outcomes: dict[str, Outcome] = {}
 
     def until_end(self, read_end: int) -> dict[str, Outcome]:
@@ -133,18 +135,20 @@ class _Watch:
             raise KeyError(key)
         match message["event"]:
             case "begin":
-                self.current, self.since = key, time.monotonic()
+                self.current, self.since, self.training = key, time.monotonic(), False
             case "ok":
                 self.outcomes[key] = Outcome("ok")
             case "failed":
                 self.outcomes[key] = Outcome(message["status"], message["reason"], self.log)
             case "progress":
+                self.training = key == "fit"
                 self.listener(key, message["what"], message["done"], message["total"])
 
     def _over_limit(self) -> Outcome | None:
         seconds = time.monotonic() - self.since
         if seconds > self.limits.wall_s:
-            return Outcome("timeout", f"no answer within {self.limits.wall_s:.0f} s", self.log)
+            said = f"no answer within {self.limits.wall_s:.0f} s{TRAIN_FIRST if self.training else ''}"
+            return Outcome("timeout", said, self.log)
         used = tree_rss_mb(self.process.pid)
         if used > self.limits.rss_mb:
             return Outcome("oom", f"used {used:.0f} MB, the limit is {self.limits.rss_mb:.0f} MB", self.log)

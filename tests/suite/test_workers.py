@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -91,6 +91,16 @@ def test_bad_adapter_has_its_own_status(tmp_path: Path, body: str, status: str, 
 def test_hanging_adapter_is_stopped(tmp_path: Path) -> None:
     found = outcome(tmp_path, "time.sleep(600)", Limits(wall_s=4))
     assert (found.status, found.reason) == ("timeout", "no answer within 4 s")
+
+
+def test_a_training_that_takes_too_long_says_what_to_do(tmp_path: Path) -> None:
+    job = replace(make_job(tmp_path, "return clip"), fit_key="key")
+    with (tmp_path / "mine.py").open("a") as file:
+        file.write("\n    def fit(self, takes, *, seed, budget, progress):\n"
+                   "        progress('learning', 1, 9)\n        time.sleep(600)\n")  # fmt: skip
+    found = run_job(job, tmp_path / "logs", limits=Limits(wall_s=6), listener=lambda *_: None)["cell"]
+    assert found.status == "timeout"
+    assert found.reason.startswith("no answer within 6 s, in training; `stylebench fit` takes as long")
 
 
 def test_adapter_that_grows_is_stopped(tmp_path: Path) -> None:
