@@ -95,9 +95,14 @@ def _primary(table: Table, row: TableRow) -> str:
 
 def _costs(row: TableRow) -> str:
     facts = row.row.method
-    wall_s = sum(record.provenance.wall_s for record, _ in row.row.stored)
     size = "" if facts.parameters is None else f"{count(facts.parameters)} parameters, "
-    return f"{size}{escape_markdown(facts.trained_on) or 'nothing trained'}; run {duration(wall_s)}"
+    return f"{size}{escape_markdown(facts.trained_on) or 'nothing trained'}; run {_run_time(row)}"
+
+
+def _run_time(row: TableRow) -> str:
+    """Wall clock of one cell of a row: the mean over its seeds and trials."""
+    seconds = [record.provenance.wall_s for record, _ in row.row.stored]
+    return duration(sum(seconds) / len(seconds))
 
 
 def check(path: Path, records_folder: Path) -> str:
@@ -161,7 +166,7 @@ def _cost_line(row: TableRow, column: Column | None) -> list[str]:
         escape_markdown(row.title) + (" (copies)" if row.row.copies else ""),
         row.row.status if row.section == "unfinished" else value,
         str(len(row.row.seeds)) if facts.trained_on else UNDEFINED,
-        duration(sum(item.wall_s for item in provenance) / len(provenance)),
+        _run_time(row),
         f"{max(item.peak_rss_mb for item in provenance) / 1000.0:.1f} GB",
         ", ".join(words.removeprefix("needs ") for words in needs),
         escape_markdown(facts.trained_on),
