@@ -147,7 +147,7 @@ def fit(
         list[str] | None, typer.Option(help="Dataset as NAME or NAME=PATH; repeat for several. Default: procedural.")
     ] = None,
     adapter: Annotated[list[str] | None, typer.Option(help="Your adapter, FILE.py or FILE.py:Class.")] = None,
-    track: Annotated[str, typer.Option(help="Whose training motions: transfer, gesture, prediction, ...")] = "transfer",
+    track: Annotated[str, typer.Option(help="Whose training motions; gesture has its own.")] = "transfer",
     budget: Annotated[str, typer.Option(help="smoke, small or paper.")] = "small",
     seeds: Annotated[str, typer.Option("--seeds", "--seed", help="Comma-separated; one training with each.")] = "0",
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",

@@ -117,15 +117,20 @@ class MethodFacts(_Strict):
         return "" if head else rest.partition(",")[0]
 
     @property
+    def unusual_budget(self) -> str:
+        """The budget where it is not the usual one; empty for all other rows."""
+        return "" if self.budget == USUAL_BUDGET else self.budget
+
+    @property
     def row_name(self) -> str:
-        """What tells rows of a table apart: the name, and the budget where it is not the usual one."""
-        return f"{self.name}@{self.budget}" if self.budget not in ("", USUAL_BUDGET) else self.name
+        """What tells rows of a table apart: the name, and an unusual budget."""
+        return f"{self.name}@{self.unusual_budget}" if self.unusual_budget else self.name
 
     @property
     def row_title(self) -> str:
         """The title, or the name where there is none, with the same addition."""
         title = self.title or self.name
-        return f"{title} ({self.budget} budget)" if self.budget not in ("", USUAL_BUDGET) else title
+        return f"{title} ({self.unusual_budget} budget)" if self.unusual_budget else title
 
 
 class Provenance(_Strict):

@@ -56,7 +56,7 @@ def verdict_of(table: Table) -> Verdict:
     """
     ranked = [row for row in table.of("methods") if row.rank is not None]
     anchors = [row for row in table.of("anchors") if row.row.method.kind == "anchor"]
-    measured = [row for row in anchors if _primary_value(table.primary, row) is not None]
+    measured = [row for row in anchors if table.primary and _badness(table.primary, row) < float("inf")]
     nothing = [row for row in measured if is_one_of(row.row.method.name, NOTHING_ROWS)]
     tricks = [
         row
@@ -80,16 +80,11 @@ def verdict_of(table: Table) -> Verdict:
     )
 
 
-def _primary_value(column: Column | None, row: TableRow) -> float | None:
-    found = row.estimates.get(column.key) if column else None
-    return found.value if found else None
-
-
 def _why_no_floor(column: Column | None, nothing: Sequence[TableRow], true: Sequence[TableRow]) -> str:
     """Why *better than nothing* has no meaning in a table; empty where it has one. Rows best first."""
     if column is None or not nothing:
         return "no row that does nothing has a number here"
-    right = [row for row in nothing if column.better == "lower" and (_primary_value(column, row) or 0.0) < RIGHT]
+    right = [row for row in nothing if column.better == "lower" and _badness(column, row) < RIGHT]
     if right:
         return f"doing nothing is a right answer here ({escape_markdown(right[0].title)} {_value(column, right[0])})"
     if true and _badness(column, true[0]) >= _badness(column, nothing[0]):

@@ -15,7 +15,7 @@ from bench.suite import assemble
 from bench.suite.calls import CellCall
 from bench.suite.cell import FIT_ONLY, GenerateJob
 from bench.suite.plan import Cell, plan_cells
-from bench.suite.request import OWN_PROTOCOLS, RunRequest, checked_device, sources_of
+from bench.suite.request import RunRequest, checked_device, protocols_of, sources_of
 from bench.suite.session import Progress, Session, session_of
 from bench.suite.setting import Setting, prepare
 from bench.suite.store import Store
@@ -37,7 +37,7 @@ class FitOrder:
     ----------
     data : dataset name -> path (None for generated data).
     methods, adapter_files : as for a run; only what learns is trained.
-    track : whose training motions; gestures and prediction have their own, all other tracks those of ``transfer``.
+    track : whose training motions; ``gesture`` has its own, all other tracks those of ``transfer``.
     seeds : one training of each method with each.
     device : ``cpu`` or ``cuda``; weights of one are not those of the other.
     out : folder for figures and logs.
@@ -90,14 +90,16 @@ def fit_all(order: FitOrder, progress: Progress) -> list[Fitted]:
     _check(order)
     request = RunRequest(
         data=order.data, out=order.out, store=order.store, methods=order.methods, adapter_files=order.adapter_files,
-        only_files=bool(order.adapter_files), jobs=order.jobs, limits=order.limits, command=order.command,
+        only_files=bool(order.adapter_files), tracks=(order.track,), profile="smoke", jobs=order.jobs,
+        limits=order.limits, command=order.command,
     )  # fmt: skip
+    [protocol] = protocols_of(request)
     sources = sources_of(request)
     found: list[Fitted] = []
     with session_of(request, progress) as session:
         for name, path in order.data.items():
             dataset = load_dataset(name, path, lambda what, done, total: progress("data", what, done, total))
-            setting = prepare(dataset, OWN_PROTOCOLS[order.track], "smoke", session.store, split_kind=order.split)
+            setting = prepare(dataset, protocol, request.profile, session.store, split_kind=order.split)
             cells = _trained_cells(setting, sources, order)
             found += _fit_cells(session, setting, cells, order)
             _draw(session.store, setting, cells, order)
@@ -106,8 +108,6 @@ def fit_all(order: FitOrder, progress: Progress) -> list[Fitted]:
 
 def _check(order: FitOrder) -> None:
     checked_device(order.device)
-    if order.track not in OWN_PROTOCOLS:
-        raise BadConfig(f"unknown track {order.track!r}", where="--track", remedy=f"one of {', '.join(OWN_PROTOCOLS)}")
     if not order.methods and not order.adapter_files:
         raise BadConfig("no method named", where="--methods", remedy="stylebench list methods shows what there is")
 

@@ -72,7 +72,8 @@ def _joined(
     paper_rows = [
         _paper_row(name, method, columns, cells_of, answering[method], ranks, table_id) for name, method in printed
     ]
-    ours = [name for name, row in rows.items() if row not in answering.values()]
+    shown = {row.method.row_name for row in answering.values() if row}
+    ours = [name for name in rows if name not in shown]
     own_rows = [_own_row(rows[name], columns, ranks) for name in ours if rows[name].ok]
     title = f"{published[0].paper}, {published[0].table}" if published else WITHOUT_PRINTED_NUMBERS[table_id]
     return PaperTable(

@@ -20,7 +20,6 @@ SECONDS_PER_1000_SAMPLES = {"generate": 6.0, "score": 14.0}
 """Rough cost of a cell on one core, for ``--dry-run``; measured on the anchor rows."""
 BYTES_PER_FRAME = 21 * 16 + 12
 WHOLE_TAKE_FRAMES = 1600
-"""What a row was trained on that this benchmark trained itself, followed by the budget."""
 
 
 @dataclass(frozen=True)
