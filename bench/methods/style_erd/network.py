@@ -17,6 +17,8 @@ State: TypeAlias = tuple[Tensor, Tensor]
 """Hidden and cell state of one branch, ``[layers, B, hidden]`` each."""
 N_CONTACTS = 4
 LABEL_WIDTH = 64
+OPEN_GATE = 2.0
+"""Added to the biases of gates that start open: a sigmoid of 0.88."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class Shape:
     neutral_layers, style_layers : 6 and 4 in the paper, 4 and 6 in the released code.
     learned_states : initial states are parameters; False is the ablation with zeros.
     decoder_labels : the decoder sees the target style; in the released code its input for it is zero.
-    residual : not in the paper: what is decoded is added to the frame's rotations.
+    carrying_start : not in the paper: layers of the branches start as ones that pass on what they get.
     """
 
     n_rotations: int
@@ -43,7 +45,7 @@ class Shape:
     style_layers: int = 4
     learned_states: bool = True
     decoder_labels: bool = True
-    residual: bool = False
+    carrying_start: bool = False
 
     @property
     def n_motion(self) -> int:
@@ -58,6 +60,8 @@ class Branch(nn.Module):
     def __init__(self, shape: Shape, layers: int, n_states: int) -> None:
         super().__init__()
         self.lstm = nn.LSTM(shape.hidden, shape.hidden, layers, batch_first=True)
+        if shape.carrying_start:
+            _carry(self.lstm)
         states = torch.zeros(2, layers, n_states, shape.hidden)
         if shape.learned_states:
             self.states = nn.Parameter(states)
@@ -138,6 +142,18 @@ class StyleErd(nn.Module):
         labels = target if self.shape.decoder_labels else torch.zeros_like(target)
         hidden = self.decoder(torch.cat([code, labels[:, None].expand(-1, code.shape[1], -1)], dim=2))
         return self.rotation_layer(hidden), self.velocity_layer(hidden)
+
+
+@torch.no_grad()
+def _carry(lstm: nn.LSTM) -> None:
+    """Open input and output gates, forget soon, and turn what comes in without stretching it."""
+    size = lstm.hidden_size
+    for layer in range(lstm.num_layers):
+        into_input, into_forget, _, into_output = lstm.get_parameter(f"bias_ih_l{layer}").chunk(4)
+        into_input.add_(OPEN_GATE)
+        into_output.add_(OPEN_GATE)
+        into_forget.sub_(0.5 * OPEN_GATE)
+        nn.init.orthogonal_(lstm.get_parameter(f"weight_ih_l{layer}")[2 * size : 3 * size])
 
 
 def _branch(module: nn.Module) -> Branch:

@@ -53,6 +53,7 @@ class StyleErdConfig:
     withheld : share of sources whose style label the encoder does not get in training: a stream has none.
     neutral_share : of the sources; every other one is transferred to neutral.
     decay : of the averaged weights; 0 keeps the last ones.
+    carrying_start : not in the paper: the recurrent layers start as ones that pass on what they get.
     any_pairs, residual, content_class, style_class : not in the paper, see ``style_erd-content``.
     """
 
@@ -83,6 +84,7 @@ class StyleErdConfig:
     withheld: float = 0.5
     neutral_share: float = 0.5
     decay: float = 0.0
+    carrying_start: bool = False
     any_pairs: bool = False
     residual: bool = False
     content_class: float = 0.0
@@ -100,6 +102,7 @@ class StyleErdConfig:
             self.style_layers,
             self.learned_states,
             self.decoder_labels,
+            carrying_start=self.carrying_start,
         )
 
     def at(self, budget: str) -> StyleErdConfig:
@@ -115,8 +118,8 @@ class StyleErdConfig:
 BUDGET_CHANGES: Mapping[str, Mapping[str, float]] = {
     "smoke": {"n_steps": 3, "batch": 4, "stride": 16, "classifier_steps": 3},
     "small": {
-        "n_steps": 5000, "stride": 8, "rate": 1e-3, "discriminator_rate": 5e-4, "classifier_steps": 400,
-        "decay": 0.995, "penalty": 16.0, "agreement": 1.0,
+        "n_steps": 4500, "stride": 8, "rate": 1e-3, "discriminator_rate": 5e-4, "classifier_steps": 400,
+        "decay": 0.995, "agreement": 1.0, "carrying_start": True,
     },
 }  # fmt: skip
 """Fields in which a budget differs from the paper's."""

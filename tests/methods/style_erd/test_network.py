@@ -50,6 +50,21 @@ def test_without_learned_states_a_branch_is_its_lstm() -> None:
     assert all(not hidden.any() and not cell.any() for hidden, cell in generator.initial(torch.eye(5)))
 
 
+def test_a_carrying_start_brings_a_frame_through_six_layers() -> None:
+    """With PyTorch's start next to nothing arrives behind the sixth, and hardly a gradient comes back."""
+    passed, gradient = {}, {}
+    for carries in (False, True):
+        torch.manual_seed(0)
+        branch = StyleErd(Shape(4 * 31, 3 * 20, 7, 5, carrying_start=carries)).neutral
+        frames = (0.3 * noise(64, 24, 32)).requires_grad_()
+        out, _ = branch(frames, branch.initial(torch.eye(5)[[0] * 64]))
+        passed[carries] = float(out.detach()[:, 12:].std(dim=(0, 1)).mean() / 0.3)
+        [back] = torch.autograd.grad(out[:, -1].sum(), frames)
+        gradient[carries] = float(back[:, -1].std())
+    assert passed[False] < 1e-3 and passed[True] > 0.1
+    assert gradient[False] < 1e-4 and gradient[True] > 0.01
+
+
 def test_initial_states_are_those_of_the_content() -> None:
     generator = StyleErd(TINY)
     with torch.no_grad():
