@@ -44,14 +44,21 @@ class Guarded:
         pipes = (self.process.stdin, self.process.stdout, self.process.stderr)
         self.requests, self.answers, errors = (-1 if pipe is None else pipe.fileno() for pipe in pipes)
         self.printed = bytearray()
-        pump = threading.Thread(target=copy_log, args=(errors, log_fd, self.printed), daemon=True)
-        pump.start()
-        self._end = weakref.finalize(self, end_guarded, self.process, lifeline, pump)
+        self._pump = threading.Thread(target=copy_log, args=(errors, log_fd, self.printed), daemon=True)
+        self._pump.start()
+        self._end = weakref.finalize(self, end_guarded, self.process, lifeline, self._pump)
 
     @property
     def is_open(self) -> bool:
         """False once it has been ended from here."""
         return self._end.alive
+
+    def last_words(self) -> str:
+        """The last line that it wrote to stderr; where it has ended, all of that has been read."""
+        if self.process.poll() is not None:
+            self._pump.join(2.0)
+        lines = [line.strip() for line in bytes(self.printed).decode("utf-8", "replace").splitlines()]
+        return next((line for line in reversed(lines) if line), "")
 
     def hang_up(self) -> None:
         """Close the line to it: it hears nothing more."""

@@ -211,19 +211,16 @@ class Session:
 
     def _death(self, call: str) -> MethodFailed:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._guarded.process.wait(3.0)
+            self._guarded.process.wait(6.0)
         code = self._guarded.process.returncode
         if code is None:
             return self._violation(f"closed its output during {call!r}", "it closed stdout, which it must keep open")
-        # The log's last line may still be on its way.
-        time.sleep(0.1)
         how = f"was ended by signal {code - 128}" if code > 128 else f"ended with exit code {code}"
         cause = self._last_words() or ("out of memory" if code == 128 + 9 else "")
         return MethodFailed(f"the program {how} during {call!r}", where=self.program.name, cause=cause)
 
     def _last_words(self) -> str:
-        lines = [line.strip() for line in bytes(self._guarded.printed).decode("utf-8", "replace").splitlines()]
-        return one_line(next((line for line in reversed(lines) if line), ""))
+        return one_line(self._guarded.last_words())
 
 
 def parse_message(line: bytes) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -59,18 +60,24 @@ class Store:
             facts = write(draft)
             (draft / DONE_FILE).write_text(json.dumps(facts, sort_keys=True))
             self._flush(draft)
-            final = self.folder(stage, key)
-            final.parent.mkdir(parents=True, exist_ok=True)
-            if not self.has(stage, key):
-                shutil.rmtree(final, ignore_errors=True)
-                try:
-                    draft.rename(final)
-                except OSError:
-                    if not self.has(stage, key):
-                        raise
-            return final
+            return self._place(draft, stage, key)
         finally:
             shutil.rmtree(draft, ignore_errors=True)
+
+    def _place(self, draft: Path, stage: str, key: str) -> Path:
+        """Rename a draft to its place, unless the result is there by now; what is left of a broken one goes away."""
+        final = self.folder(stage, key)
+        final.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            draft.rename(final)
+        except OSError:
+            if not self.has(stage, key):
+                shutil.rmtree(final, ignore_errors=True)
+                with contextlib.suppress(OSError):
+                    draft.rename(final)
+                if not self.has(stage, key):
+                    raise
+        return final
 
     def draft(self, stage: str) -> Path:
         """An empty folder under ``tmp`` that belongs to this process: others sweep it away once this one is gone."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
-import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -14,6 +15,7 @@ from reports.records import Record
 from tests.adapters.outside import with_worker
 from tests.suite.conftest import undisturbed as undisturbed
 from tests.suite.tiny import METHODS, contents, tiny_run
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.slow
 
@@ -45,6 +47,9 @@ def _open(descriptor):
         return False
     return True
 """
+
+NAP = f"{1000 + os.getpid()}.5"
+"""Seconds that children sleep; other tests beside these sleep for others."""
 
 ZOO: dict[str, tuple[str, str, str]] = {
     "CrashAtClip5": ("if self.calls == 5: raise RuntimeError('clip 5')", "failed", "RuntimeError: clip 5"),
@@ -82,9 +87,9 @@ ZOO: dict[str, tuple[str, str, str]] = {
 
 HARMLESS = {
     "Floods": "sys.stdout.write('x' * 10**6)\nsys.stderr.write('y' * 10**6)",
-    "HasManyChildren": "for _ in range(20): subprocess.Popen(['sleep', '1234.5'])",
+    "HasManyChildren": f"for _ in range(20): subprocess.Popen(['sleep', '{NAP}'])",
     "LeaksSlowly": "self.kept = getattr(self, 'kept', []) + [np.ones(5 * 2**17)]",
-    "Forks": "subprocess.Popen(['sleep', '1234.5'], start_new_session=True)",
+    "Forks": f"subprocess.Popen(['sleep', '{NAP}'], start_new_session=True)",
     "ForksAndComesBack": "if os.fork() == 0: time.sleep(0.01)",
     "IgnoresSigterm": "signal.signal(signal.SIGTERM, signal.SIG_IGN)",
     "DeletesItsScratch": "shutil.rmtree(tempfile.gettempdir(), ignore_errors=True)",
@@ -104,7 +109,7 @@ OUTSIDE: dict[str, tuple[str, str, str]] = {
     "outside-dies": ("state.append(1)\nif len(state) == 5: os._exit(7)", "failed", "exit code 7"),
     "outside-cannot-be-stopped": (
         "for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP): signal.signal(number, signal.SIG_IGN)\n"
-        "subprocess.Popen(['sleep', '1234.5'], start_new_session=True)\n"
+        f"subprocess.Popen(['sleep', '{NAP}'], start_new_session=True)\n"
         "while True: pass", "timeout", "no answer within",
     ),
     "outside-closes-its-pipes": ("os.closerange(0, 256)", "failed", "during 'transfer'"),
@@ -141,7 +146,13 @@ def write_zoo(folder: Path) -> list[str]:
 
 
 def descendants() -> set[int]:
-    return {process.pid for process in psutil.Process().children(recursive=True) if process.is_running()}
+    """Processes that come from this one, but the tracker that Python starts once and keeps."""
+    found = set()
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            if "resource_tracker" not in " ".join(process.cmdline()):
+                found.add(process.pid)
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -156,12 +167,8 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Record], 
         patch.setenv("TMPDIR", str(scratch))
         patch.setattr(tempfile, "tempdir", None)
         result = tiny_run(folder / "out", folder / "store", adapter_files=options, limits=LIMITS, jobs=2)
-    deadline = time.monotonic() + 60.0
-    while (descendants() - before or list(scratch.glob("stylebench-*"))) and time.monotonic() < deadline:
-        time.sleep(0.2)
-    assert not [p for p in descendants() - before if "resource_tracker" not in " ".join(psutil.Process(p).cmdline())]
-    assert not list(scratch.glob("stylebench-*"))
-    assert not [p for p in psutil.process_iter(["cmdline"]) if p.info["cmdline"] == ["sleep", "1234.5"]]
+    wait_for(lambda: not descendants() - before and not list(scratch.glob("stylebench-*")), "the end of all animals")
+    assert not [p for p in psutil.process_iter(["cmdline"]) if p.info["cmdline"] == ["sleep", NAP]]
     return {record.method.name: record for record in result.records}, folder
 
 

@@ -35,7 +35,7 @@ SMALL_NUMPY = "1.26.4"
 
 @pytest.fixture(autouse=True)
 def few_calls(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.adapters.check.GROWTH_CALLS", 50)
+    monkeypatch.setattr("bench.adapters.check.GROWTH_CALLS", 150)
 
 
 def adapter_at(path: Path) -> type[Adapter]:

@@ -124,7 +124,8 @@ def test_paths_move_with_the_store(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert moved.job.cells == call.job.cells
 
 
-def test_attempts_count_and_tell_how_far_they_are(tmp_path: Path) -> None:
+def test_attempts_count_and_tell_how_far_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.suite.calls.REPORT_EVERY_S", 60.0)
     attempts = [Attempt(tmp_path, "cell") for _ in range(MOST_ATTEMPTS + 1)]
     assert [attempt.too_many for attempt in attempts] == [False, False, True]
     assert attempts[0].retried == "" and "was lost" in attempts[1].retried

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import pytest
 from bench.errors import BadConfig
 from bench.suite import executors
 from bench.suite.executors import workers_of
+from tests.waiting import started, wait_for
 
 
 @dataclass(frozen=True)
@@ -67,17 +67,18 @@ def test_processes_leave_when_the_one_that_started_them_is_killed() -> None:
         "    processes = LocalProcesses(1)\n    print(processes.submit(abs, -1).result(), flush=True)\n"
         "    time.sleep(60)"
     )
-    main = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
-    assert main.stdout is not None and main.stdout.readline() == b"1\n"
-    children = psutil.Process(main.pid).children(recursive=True)
-    assert children
-    main.kill()
-    main.wait()
-    main.stdout.close()
-    deadline = time.monotonic() + 20.0
-    while any(child.is_running() and child.status() != psutil.STATUS_ZOMBIE for child in children):
-        assert time.monotonic() < deadline, children
-        time.sleep(0.2)
+    with started([sys.executable, "-c", code], stdout=subprocess.PIPE) as main:
+        assert main.stdout is not None and main.stdout.readline() == b"1\n"
+        children = psutil.Process(main.pid).children(recursive=True)
+        assert children
+    wait_for(lambda: not any(_lives(child) for child in children), "the end of the processes")
+
+
+def _lives(process: psutil.Process) -> bool:
+    try:
+        return bool(process.status() != psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return False
 
 
 def test_no_scheduler_there_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

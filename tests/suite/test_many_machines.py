@@ -8,8 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +19,11 @@ import pytest
 from bench.errors import BadConfig
 from bench.suite.machines import STORE_VARIABLE
 from tests.suite.tiny import contents, tiny_run
+from tests.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default::ResourceWarning")]
 
 N_WORKERS = 3
-PATIENCE_S = 120.0
 
 
 @dataclass
@@ -37,7 +36,7 @@ class Cluster:
 
     def __post_init__(self) -> None:
         self.process = self.start("scheduler", "--host", "127.0.0.1", "--port", "0")
-        wait_for(Path(self.scheduler).is_file)
+        wait_for(Path(self.scheduler).is_file, "the scheduler")
 
     @property
     def scheduler(self) -> str:
@@ -90,15 +89,6 @@ def store(undisturbed: Path, tmp_path: Path) -> Path:
     return tmp_path / "store"
 
 
-def wait_for(condition: Callable[[], Any]) -> Any:
-    """What a condition gives, once it gives something."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not (found := condition()):
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
-    return found
-
-
 def provenance_of(out: Path) -> list[dict[str, Any]]:
     return [json.loads(path.read_text())["provenance"] for path in sorted((out / "records").glob("*.json"))]
 
@@ -107,7 +97,8 @@ def begun(out: Path, store: Path, cluster: Cluster) -> tuple[subprocess.Popen[st
     """A run on a cluster, in the middle of its first cell, and the file by which a worker claimed that."""
     command = [sys.executable, "-m", "tests.suite.tiny", str(out), str(store), cluster.scheduler]
     main = cluster.stack.enter_context(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
-    return main, wait_for(lambda: next((store / "tmp").glob("run-*/*.attempt-1"), None))
+    cluster.stack.callback(main.kill)
+    return main, wait_for(lambda: next((store / "tmp").glob("run-*/*.attempt-1"), None), "the first cell")
 
 
 def test_one_of_three_workers_is_killed_and_nothing_shows(
@@ -118,7 +109,7 @@ def test_one_of_three_workers_is_killed_and_nothing_shows(
     cluster.ready()
     out = tmp_path / "out"
     main, claim = begun(out, store, cluster)
-    victim = int(wait_for(claim.read_text).rpartition(":")[2])
+    victim = int(wait_for(claim.read_text, "the name of its worker").rpartition(":")[2])
     assert victim in [worker.pid for worker in workers]
     os.kill(victim, signal.SIGKILL)
     assert main.wait(timeout=PATIENCE_S) == 0

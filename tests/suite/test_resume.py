@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import random
 import shutil
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 
 import psutil
@@ -18,6 +16,7 @@ import pytest
 from bench.suite.output import write_report
 from bench.suite.run import RunResult
 from tests.suite.tiny import METHODS, contents, tiny_run
+from tests.waiting import started, wait_for
 
 pytestmark = pytest.mark.slow
 
@@ -109,17 +108,23 @@ def test_killed_runs_resume_and_end_the_same(undisturbed: Path, tmp_path: Path) 
     finished: dict[tuple[str, str], int] = {}
     kills = workers_killed = 0
     with ExitStack() as stack:
-        main = stack.enter_context(_started(command))
+        main = stack.enter_context(started(command))
         while kills < N_KILLS:
+            kills_a_worker = chance.random() < 0.5
+            if kills_a_worker:
+                wait_for(partial(_has_ended_or_works, main), "a worker of the run")
             try:
                 assert main.wait(timeout=chance.uniform(0.5, 10.0)) == 0
                 lives = False
             except subprocess.TimeoutExpired:
                 kills += 1
-                lives = _lives_on(main, chance)
+                lives = kills_a_worker and _worker_killed(main, chance)
                 workers_killed += lives
+                if not lives:
+                    main.kill()
+                    main.wait()
             if not lives:
-                main = stack.enter_context(_started(command))
+                main = stack.enter_context(started(command))
             now = results(store)
             assert finished.items() <= now.items()
             finished = now
@@ -132,29 +137,21 @@ def test_killed_runs_resume_and_end_the_same(undisturbed: Path, tmp_path: Path) 
     assert list((store / "tmp").iterdir()) == []
     shutil.copytree(undisturbed / "out", tmp_path / "undisturbed")
     assert write_report(out) == write_report(tmp_path / "undisturbed")
-    _wait_for_orphans(str(tmp_path))
+    pgrep = ["pgrep", "-f", str(tmp_path)]
+    wait_for(lambda: subprocess.run(pgrep, capture_output=True).returncode == 1, "the end of orphaned workers")
 
 
-@contextmanager
-def _started(command: list[str]) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that is gone at the end, whatever a test that failed left of it."""
-    with subprocess.Popen(command) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
+def _has_ended_or_works(main: subprocess.Popen[bytes]) -> bool:
+    return main.poll() is not None or bool(psutil.Process(main.pid).children(recursive=True))
 
 
-def _lives_on(main: subprocess.Popen[bytes], chance: random.Random) -> bool:
-    """Kill the main process or, as often, one of those it started; True where the main process lives."""
+def _worker_killed(main: subprocess.Popen[bytes], chance: random.Random) -> bool:
+    """Kill one of the processes that the main one started; False where there is none."""
     workers = psutil.Process(main.pid).children(recursive=True)
-    if workers and chance.random() < 0.5:
+    if workers:
         with suppress(psutil.NoSuchProcess):
             chance.choice(workers).kill()
-        return True
-    main.send_signal(signal.SIGKILL)
-    main.wait()
-    return False
+    return bool(workers)
 
 
 def results(store: Path) -> dict[tuple[str, str], int]:
@@ -164,14 +161,3 @@ def results(store: Path) -> dict[tuple[str, str], int]:
         for path in store.glob("*/*/done.json")
         if path.parent.parent.name != "tmp"
     }
-
-
-def _wait_for_orphans(marker: str) -> None:
-    """Workers of killed runs end by themselves, on an idle machine within seconds."""
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
-        found = subprocess.run(["pgrep", "-f", marker], capture_output=True, text=True, check=False).stdout.split()
-        if not found:
-            return
-        time.sleep(0.5)
-    pytest.fail(f"processes of killed runs still live: {found}")

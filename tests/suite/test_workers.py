@@ -98,9 +98,12 @@ def test_a_training_that_takes_too_long_says_what_to_do(tmp_path: Path) -> None:
     with (tmp_path / "mine.py").open("a") as file:
         file.write("\n    def fit(self, takes, *, seed, budget, progress):\n"
                    "        progress('learning', 1, 9)\n        time.sleep(600)\n")  # fmt: skip
-    found = run_job(job, tmp_path / "logs", limits=Limits(wall_s=6), listener=lambda *_: None)["cell"]
-    assert found.status == "timeout"
-    assert found.reason.startswith("no answer within 6 s, in training; `stylebench fit` takes as long")
+    for wall_s in (6, 60, 300):  # on a busy machine the training may not have begun by then
+        found = run_job(job, tmp_path / "logs", limits=Limits(wall_s=wall_s), listener=lambda *_: None)["cell"]
+        assert found.status == "timeout"
+        if "in training" in found.reason:
+            break
+    assert found.reason.startswith(f"no answer within {wall_s} s, in training; `stylebench fit` takes as long")
 
 
 def test_adapter_that_grows_is_stopped(tmp_path: Path) -> None:
