@@ -14,7 +14,7 @@ PATIENCE_S = 600.0
 
 
 def wait_for(condition: Callable[[], Found | None], what: str, patience_s: float = PATIENCE_S) -> Found:
-    """What a condition gives, once it gives something."""
+    """What a condition gives, once it gives something; ``patience_s`` is a bound where the time is ours to keep."""
     deadline = time.monotonic() + patience_s
     while not (found := condition()):
         assert time.monotonic() < deadline, what

@@ -534,7 +534,7 @@ def test_killed_harness_leaves_nothing_behind(folder: Path, shared_memory: Path,
         assert harness.stdout.readline() == b"ready\n"
         assert left_behind(folder)
         harness.send_signal(signal.SIGKILL)
-    wait_for(lambda: not left_behind(folder) and not any(shared_memory.iterdir()), "the end of the program")
+    wait_for(lambda: not left_behind(folder) and not any(shared_memory.iterdir()), "the end of the program", 20.0)
     check_nothing_is_left(folder, shared_memory)
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from bench.adapters.guarded import end_guarded, start_guarded
 from tests.adapters.outside import left_behind
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -48,7 +48,7 @@ def test_letting_go_ends_the_program_and_removes_its_folder(tmp_path: Path) -> N
 @pytest.mark.parametrize(("end", "code"), [("sys.exit(3)", 3), ("os.kill(os.getpid(), 9)", 137)])
 def test_exit_code_is_the_programs(tmp_path: Path, end: str, code: int) -> None:
     with started(f"import os, sys; print('ready', flush=True); {end}", tmp_path) as (process, _):
-        assert process.wait(PATIENCE_S) == code
+        assert process.wait(20.0) == code
         assert not (tmp_path / "exchange").exists()
 
 

@@ -167,7 +167,9 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Record], 
         patch.setenv("TMPDIR", str(scratch))
         patch.setattr(tempfile, "tempdir", None)
         result = tiny_run(folder / "out", folder / "store", adapter_files=options, limits=LIMITS, jobs=2)
-    wait_for(lambda: not descendants() - before and not list(scratch.glob("stylebench-*")), "the end of all animals")
+    wait_for(
+        lambda: not descendants() - before and not list(scratch.glob("stylebench-*")), "the end of all animals", 60.0
+    )
     assert not [p for p in psutil.process_iter(["cmdline"]) if p.info["cmdline"] == ["sleep", NAP]]
     return {record.method.name: record for record in result.records}, folder
 

@@ -71,7 +71,7 @@ def test_processes_leave_when_the_one_that_started_them_is_killed() -> None:
         assert main.stdout is not None and main.stdout.readline() == b"1\n"
         children = psutil.Process(main.pid).children(recursive=True)
         assert children
-    wait_for(lambda: not any(_lives(child) for child in children), "the end of the processes")
+    wait_for(lambda: not any(_lives(child) for child in children), "the end of the processes", 20.0)
 
 
 def _lives(process: psutil.Process) -> bool:

@@ -138,7 +138,7 @@ def test_killed_runs_resume_and_end_the_same(undisturbed: Path, tmp_path: Path) 
     shutil.copytree(undisturbed / "out", tmp_path / "undisturbed")
     assert write_report(out) == write_report(tmp_path / "undisturbed")
     pgrep = ["pgrep", "-f", str(tmp_path)]
-    wait_for(lambda: subprocess.run(pgrep, capture_output=True).returncode == 1, "the end of orphaned workers")
+    wait_for(lambda: subprocess.run(pgrep, capture_output=True).returncode == 1, "the end of orphaned workers", 60.0)
 
 
 def _has_ended_or_works(main: subprocess.Popen[bytes]) -> bool:

@@ -196,7 +196,7 @@ def test_changed_or_damaged_timings_are_refused(tmp_path: Path) -> None:
 def test_identical_adapters_agree_and_a_known_duration_is_found(tmp_path: Path) -> None:
     """Two identical adapters within 3 % at the median, 5 ms within 5 %, the harness below 20 us a call.
 
-    A machine that others use can spoil one attempt, so there are three; where it was busy in one, nothing is said.
+    A machine that others use spoils attempts: it takes three quiet ones to fail, and without them nothing is said.
     """
     world(tmp_path)
     sleeping = written(tmp_path, "sleeping", "time.sleep(0.005)\nreturn content.clip")
@@ -205,8 +205,8 @@ def test_identical_adapters_agree_and_a_known_duration_is_found(tmp_path: Path) 
         job_of(tmp_path, AdapterSource("pose-adain"), "other"),
         job_of(tmp_path, sleeping, "sleeping"),
     ]
-    plan, waited = TimingPlan(lengths=(60,)), list[float]()
-    for attempt in range(3):
+    plan, quiet = TimingPlan(lengths=(60,)), 0
+    for attempt in range(6):
         found = {key: facts_of(one) for key, one in timed(jobs, tmp_path / str(attempt), plan).items()}
         medians = {
             key: {name: float(np.median(one.own_s(name))) for name in one.durations_s} for key, one in found.items()
@@ -219,7 +219,9 @@ def test_identical_adapters_agree_and_a_known_duration_is_found(tmp_path: Path) 
         shares = [
             one.waited_s[name].sum() / one.durations_s[name].sum() for one in found.values() for name in one.durations_s
         ]
-        waited.append(float(max(shares)))
-    if max(waited) > 0.05:
-        pytest.skip(f"the host is busy: {100 * max(waited):.0f} % of the timed seconds went to other processes")
-    pytest.fail(f"apart by {100 * apart:.2f} %, 5 ms off by {100 * off:.2f} %, overhead {1e6 * overhead_s:.1f} us")
+        quiet += max(shares) <= 0.05
+        if quiet == 3:
+            pytest.fail(
+                f"apart by {100 * apart:.2f} %, 5 ms off by {100 * off:.2f} %, overhead {1e6 * overhead_s:.1f} us"
+            )
+    pytest.skip(f"the host is busy: {100 * max(shares):.0f} % of the last timed seconds went to other processes")
